@@ -1,0 +1,1 @@
+"""Joins simulator and trackers: named scenarios, the loop, scores and reports."""

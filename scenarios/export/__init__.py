@@ -1,0 +1,1 @@
+"""Tracks and truth in the formats that other tools read."""

@@ -1,0 +1,1 @@
+"""Plots, annotated video and one self-contained HTML page."""

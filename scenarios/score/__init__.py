@@ -1,0 +1,1 @@
+"""Pure functions on ids and similarities: CLEAR, identity, HOTA, identification."""

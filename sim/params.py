@@ -1,0 +1,137 @@
+"""What can be set in a scene: frozen models, checked when they are built. A scenario file fills them in."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+NonNegative = Annotated[FiniteFloat, Field(ge=0)]
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+Fraction = Annotated[FiniteFloat, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=0)]
+
+
+class Params(BaseModel):
+    """Base of all parameter models: frozen, and a key that it does not know is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class CameraParams(Params):
+    """The pinhole camera and where it is mounted on the car."""
+
+    width: Annotated[int, Field(ge=16, le=4096)] = 640
+    height: Annotated[int, Field(ge=16, le=4096)] = 480
+    focal: Positive = 800.0
+    """Pixels."""
+    mount_height: Positive = 1.2
+    """Metres above the ground."""
+    mount_forward: FiniteFloat = 0.6
+    """Metres before the middle of the car."""
+    pitch: FiniteFloat = 0.0
+    """Radians, positive looks up."""
+
+
+class RoadParams(Params):
+    """A carriageway each way; keep right."""
+
+    lanes: Annotated[int, Field(ge=1, le=5)] = 2
+    """Lanes the ego's way."""
+    oncoming_lanes: Annotated[int, Field(ge=0, le=5)] = 2
+    lane_width: Positive = 3.6
+    median: NonNegative = 1.0
+    """Metres between the two directions' innermost lane edges."""
+    shoulder: NonNegative = 2.0
+    """Paved metres outside the outermost lane."""
+    curved: bool = False
+    """Straights joined by arcs instead of one straight."""
+    min_radius: Positive = 150.0
+    max_radius: Positive = 500.0
+
+
+class TrafficParams(Params):
+    """Who drives, how densely and how fast."""
+
+    density: NonNegative = 14.0
+    """Vehicles per kilometre and lane, the ego's way."""
+    oncoming_density: NonNegative = 10.0
+    speed: NonNegative = 22.0
+    """Mean desired speed, m/s."""
+    speed_spread: NonNegative = 3.0
+    """Standard deviation of the desired speeds, m/s."""
+    vans: Fraction = 0.12
+    lorries: Fraction = 0.10
+    buses: Fraction = 0.03
+    parked: NonNegative = 0.0
+    """Parked cars per kilometre of kerb."""
+    stop_and_go: bool = False
+    """The leaders brake to a stop and drive on, again and again."""
+
+
+class EgoParams(Params):
+    """The camera car."""
+
+    driver: Literal["traffic", "profile", "actions"] = "traffic"
+    speed: NonNegative = 20.0
+    """Desired speed, m/s."""
+    lane: Annotated[int, Field(ge=-1)] = -1
+    """Lane from the left, -1 drawn from the seed."""
+    pitch_vibration: NonNegative = 0.0012
+    """Standard deviation, rad."""
+    speed_noise: NonNegative = 0.1
+    """Odometry, standard deviation, m/s."""
+    yaw_noise: NonNegative = 0.002
+    """Odometry, standard deviation, rad/s."""
+
+
+class SceneryParams(Params):
+    """What stands beside the road."""
+
+    setting: Literal["motorway", "rural", "urban"] = "motorway"
+    corridor: Positive = 5.0
+    """D of paper 1's eq. (12): scale of the empty corridor around the camera, metres."""
+    density: NonNegative = 1.0
+    """Multiplies every count."""
+    bridges: NonNegative = 0.3
+    """Overhead bridges per kilometre."""
+
+
+class LightParams(Params):
+    """Sun, sky, lamps and weather."""
+
+    time: Literal["day", "night"] = "day"
+    cloud: Fraction = 0.3
+    haze: NonNegative = 0.0012
+    """Extinction per metre."""
+    rain: Fraction = 0.0
+    street_lamps: bool = False
+
+
+class SensorParams(Params):
+    """What the camera does to the picture."""
+
+    noise: NonNegative = 1.5
+    """Standard deviation at mid grey, of 255."""
+    blur: NonNegative = 0.6
+    """Lens blur, standard deviation, px."""
+    vignetting: Fraction = 0.25
+    """Loss of light in the corners."""
+    exposure_lag: NonNegative = 0.5
+    """Seconds that the automatic exposure takes."""
+    compression: Annotated[int, Field(ge=0, le=100)] = 30
+    """0 for none; above, the loss of the recorder's JPEG coder (quality = 100 - compression)."""
+    hood: bool = True
+    """The camera car's bonnet shows at the lower edge."""
+
+
+class InCarParams(Params):
+    """A drive, seen from a camera in a car."""
+
+    camera: CameraParams = CameraParams()
+    road: RoadParams = RoadParams()
+    traffic: TrafficParams = TrafficParams()
+    ego: EgoParams = EgoParams()
+    scenery: SceneryParams = SceneryParams()
+    light: LightParams = LightParams()
+    sensor: SensorParams = SensorParams()

@@ -1,0 +1,1 @@
+"""From world state to pictures: colour, id map and depth."""

@@ -1,0 +1,69 @@
+"""What every renderer takes and gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.camera import Camera, Pose
+from sim.models import Ground, Light, Model
+from sim.world import Bodies, WorldState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stage:
+    """All that stands still in an episode, ready to be drawn.
+
+    Attributes:
+        models: What bodies' ``models`` index.
+        scenery: The bodies that never move.
+        ground: The ground (id 1).
+        light: The light at the start.
+    """
+
+    models: tuple[Model, ...]
+    scenery: Bodies
+    ground: Ground
+    light: Light
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """One rendered frame.
+
+    Attributes:
+        colour: (H, W, 3) uint8, sRGB, before the sensor.
+        ids: (H, W) uint32; 0 is the sky, 1 the ground.
+        depth: (H, W) float32 metres along the axis at pixel centres, infinite in the sky.
+    """
+
+    colour: NDArray[np.uint8]
+    ids: NDArray[np.uint32]
+    depth: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Silhouettes:
+    """Each of N vehicles drawn alone (amodal truth).
+
+    Attributes:
+        ids: (N,) uint32, the vehicles of which any part may lie in the extended frame.
+        pixels: (N,) int64, pixels inside the frame.
+        pixels_full: (N,) int64, pixels inside the frame extended by its width and height on every side.
+        boxes: (N, 4) float64 x0, y0, x1, y1 of the extended silhouette, px; not a number if empty.
+    """
+
+    ids: NDArray[np.uint32]
+    pixels: NDArray[np.int64]
+    pixels_full: NDArray[np.int64]
+    boxes: NDArray[np.float64]
+
+
+class Renderer(Protocol):
+    """Draws the world of one stage."""
+
+    def render(self, state: WorldState, camera: Camera, pose: Pose) -> Picture:
+        """Draw one frame."""

@@ -1,0 +1,1 @@
+"""The scenes: each populates a world and places its camera."""

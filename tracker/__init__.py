@@ -1,0 +1,1 @@
+"""Images in, tracks out. It knows no simulator."""

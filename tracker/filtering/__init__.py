@@ -1,0 +1,1 @@
+"""What the trackers share: Kalman filter, gating, assignment."""

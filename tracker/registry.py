@@ -1,0 +1,35 @@
+"""The trackers by name."""
+
+from __future__ import annotations
+
+import importlib
+
+from tracker.base import Tracker
+
+TRACKERS = {
+    "in-car": "tracker.in_car.tracker:InCarTracker",
+    "in-car:paper": "tracker.in_car.paper:PaperTracker",
+    "in-car:per-frame": "tracker.in_car.paper:PerFrameTracker",
+}
+
+
+def make(name: str) -> Tracker:
+    """Build a tracker.
+
+    Args:
+        name: One of `TRACKERS`, or ``module:object`` for a tracker of the reader's own.
+
+    Raises:
+        ValueError: If there is no such tracker, or calling it gives none.
+    """
+    target = TRACKERS.get(name, name)
+    module_name, _, attribute = target.partition(":")
+    try:
+        factory = getattr(importlib.import_module(module_name), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        known = ", ".join(TRACKERS)
+        raise ValueError(f"no tracker {name!r}: {error}; wanted one of {known}, or module:object") from error
+    tracker = factory()
+    if not isinstance(tracker, Tracker):
+        raise ValueError(f"{name!r} gives a {type(tracker).__name__}, which has no start(info) and step(frame)")
+    return tracker
