@@ -34,7 +34,6 @@ class Surface(IntEnum):
     GRASS = 17
     ASPHALT = 18
     HILL = 19
-    BONNET = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -121,8 +121,6 @@ class SensorParams(Params):
     """Seconds that the automatic exposure takes."""
     compression: Annotated[int, Field(ge=0, le=100)] = 30
     """0 for none; above, the loss of the recorder's JPEG coder (quality = 100 - compression)."""
-    hood: bool = True
-    """The camera car's bonnet shows at the lower edge."""
 
 
 class InCarParams(Params):
