@@ -5,13 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.camera import Camera, Pose
+from sim.params import SensorParams
 from sim.render.types import Stage
+from sim.sensor import Sensor
+from sim.truth.boxes import frame_truth
 from sim.truth.types import FrameTruth
 from sim.world import WorldState
 
@@ -68,3 +71,82 @@ class Scene(Protocol):
 
     def odometer(self, state: WorldState) -> Odometer | None:
         """Return what the car measures in a state."""
+
+
+class Simulation:
+    """Steps a scene and records what its camera sees.
+
+    Owns the renderer: use it as a context manager, or call `close`.
+    """
+
+    def __init__(self, scene: Scene, sensor: SensorParams, *, seed: int) -> None:
+        """Get ready to draw.
+
+        Args:
+            scene: The populated world.
+            sensor: What the camera does to the picture.
+            seed: The episode's seed, for the sensor's own streams.
+
+        Raises:
+            RenderUnavailableError: If there is no off-screen OpenGL here.
+        """
+        from sim.render.gl import GlRenderer  # GL is loaded only where something is drawn
+
+        self.scene = scene
+        self._renderer = GlRenderer(scene.stage, scene.camera)
+        self._sensor = Sensor(sensor, scene.stage.light, scene.camera, scene.rate, seed)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give back what the renderer holds."""
+        self._renderer.close()
+
+    def step(self, action: NDArray[np.float32] | None = None) -> Observation:
+        """Advance one tick and observe it."""
+        camera, clock = self.scene.camera, _Stopwatch()
+        state = self.scene.step(action)
+        pose = self.scene.pose(state)
+        clock.lap("world")
+        picture = self._renderer.render(state, camera, pose)
+        clock.lap("render")
+        speed = state.ego.speed if state.ego is not None else 0.0
+        image = self._sensor.expose(picture, state.tick, speed)
+        clock.lap("sensor")
+        silhouettes = self._renderer.silhouettes(state, camera, pose)
+        truth = frame_truth(state, picture, silhouettes, camera, pose)
+        clock.lap("truth")
+        return Observation(
+            tick=state.tick,
+            time=state.time,
+            image=image,
+            ids=picture.ids,
+            depth=picture.depth,
+            state=state,
+            pose=pose,
+            odometer=self.scene.odometer(state),
+            truth=truth,
+            timing_ms=clock.laps,
+        )
+
+    def run(self, frames: int) -> Iterator[Observation]:
+        """Yield that many observations, one tick each."""
+        for _ in range(frames):
+            yield self.step()
+
+
+class _Stopwatch:
+    """Milliseconds between laps."""
+
+    def __init__(self) -> None:
+        self.laps: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self.laps[name] = 1e3 * (now - self._last)
+        self._last = now
