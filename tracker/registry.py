@@ -31,5 +31,5 @@ def make(name: str) -> Tracker:
         raise ValueError(f"no tracker {name!r}: {error}; wanted one of {known}, or module:object") from error
     tracker = factory()
     if not isinstance(tracker, Tracker):
-        raise ValueError(f"{name!r} gives a {type(tracker).__name__}, which has no start(info) and step(frame)")
+        raise ValueError(f"{name!r} gives a {type(tracker).__name__}, without start(info) and step(frame)")
     return tracker

@@ -132,7 +132,7 @@ class Traces:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Predictions:
-    """Where a tracker expects what it does not see: (N,) ids, (N, 2) centres px, (N, 2, 2) covariances px^2."""
+    """Where a tracker expects what it does not see: (N,) ids, (N, 2) centres, (N, 2, 2) covariances, px."""
 
     ids: NDArray[np.int64]
     centres: NDArray[np.float64]
