@@ -54,12 +54,16 @@ class Silhouettes:
         pixels: (N,) int64, pixels inside the frame.
         pixels_full: (N,) int64, pixels inside the frame extended by its width and height on every side.
         boxes: (N, 4) float64 x0, y0, x1, y1 of the extended silhouette, px; not a number if empty.
+        masks: N times (row, column, (h, w) bool): the part of the silhouette inside the frame, and where the
+            mask's upper left corner lies in it; the array may be (0, 0). Truth needs them to tell who hides
+            whom. None where the renderer gives none: occluders are unknown then.
     """
 
     ids: NDArray[np.uint32]
     pixels: NDArray[np.int64]
     pixels_full: NDArray[np.int64]
     boxes: NDArray[np.float64]
+    masks: tuple[tuple[int, int, NDArray[np.bool_]], ...] | None = None
 
 
 class Renderer(Protocol):
