@@ -1,12 +1,19 @@
-"""What is kept of an episode: all that scores are computed from, so that scoring again never renders again."""
+"""What is kept of an episode: all that scores are computed from, so that scoring never renders again."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenarios.files import moved_in
 from sim.truth.types import FrameTruth
 from tracker.types import Tracks
 
@@ -77,3 +84,124 @@ class EpisodeLog:
     ego_speed: NDArray[np.float64]
     hashes: dict[str, str]
     timing_ms: dict[str, NDArray[np.float64]]
+
+
+_FORMAT = "testtrack episode 1"
+_PLAIN = ("scenario", "spec_id", "seed", "tracker", "rate", "width", "height", "has_boxes", "hashes")
+_TRUTH_ARRAYS = tuple(f.name for f in fields(FrameTruth) if f.name != "tick")
+_TRACK_ARRAYS = ("ids", "boxes", "status")
+_OPTIONAL_TRACK_ARRAYS = {"score": (), "state": (4,), "covariance": (4, 4)}
+
+
+def save(log: EpisodeLog, path: Path | str) -> None:
+    """Write a log as one NumPy archive (.npz), without pickles; the same log gives the same bytes.
+
+    Frames are joined into flat arrays, beside the number of rows that each frame has. The file is written
+    beside its place and moved in when it is whole.
+
+    Raises:
+        OSError: If it cannot be written.
+    """
+    plain = {"format": _FORMAT} | {name: getattr(log, name) for name in _PLAIN}
+    arrays: dict[str, Any] = {
+        "plain": np.frombuffer(json.dumps(plain).encode(), np.uint8),
+        "ego_speed": log.ego_speed,
+        "truth/ticks": np.array([frame.tick for frame in log.truth], np.int64),
+        "truth/rows": np.array([len(frame) for frame in log.truth], np.int64),
+        "tracks/rows": np.array([len(frame) for frame in log.tracks], np.int64),
+    }
+    if log.truth:
+        for name in _TRUTH_ARRAYS:
+            arrays[f"truth/{name}"] = np.concatenate([getattr(frame, name) for frame in log.truth])
+    if log.tracks:
+        for name in _TRACK_ARRAYS:
+            arrays[f"tracks/{name}"] = np.concatenate([getattr(frame, name) for frame in log.tracks])
+        for name, shape in _OPTIONAL_TRACK_ARRAYS.items():
+            values = [getattr(frame, name) for frame in log.tracks]
+            arrays[f"tracks/{name}/given"] = np.array([value is not None for value in values])
+            arrays[f"tracks/{name}"] = np.concatenate(
+                [np.zeros((0, *shape)), *(value for value in values if value is not None)]
+            )
+    if log.traces is not None:
+        arrays |= {f"traces/{f.name}": getattr(log.traces, f.name) for f in fields(TraceLog)}
+    arrays |= {f"timing_ms/{name}": values for name, values in log.timing_ms.items()}
+    with moved_in(Path(path)) as part, part.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+
+
+def load(path: Path | str) -> EpisodeLog:
+    """Read what `save` wrote.
+
+    Raises:
+        ValueError: If there is no such file, or it is not a whole episode log.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise ValueError("it is a bare array")
+            return _read({name: archive[name] for name in archive.files})
+    except FileNotFoundError as error:
+        raise ValueError(f"there is no episode log {path}") from error
+    except KeyError as error:
+        raise ValueError(f"{path} is no episode log: it lacks {error}") from error
+    except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+        reason = " ".join(str(error).split())
+        raise ValueError(f"{path} is no whole episode log: {reason}") from error
+
+
+def _read(arrays: Mapping[str, NDArray[Any]]) -> EpisodeLog:
+    plain = json.loads(arrays["plain"].tobytes())
+    if plain["format"] != _FORMAT:
+        raise ValueError(f"its format is {plain['format']!r}, wanted {_FORMAT!r}")
+    ticks, speed = arrays["truth/ticks"], arrays["ego_speed"]
+    track_rows = arrays["tracks/rows"]
+    if not len(ticks) == len(arrays["truth/rows"]) == len(track_rows) == len(speed):
+        raise ValueError("its truth, tracks and speeds are not of equally many frames")
+    truth: list[FrameTruth] = []
+    tracks: list[Tracks] = []
+    if len(ticks):
+        columns = {name: _split(arrays[f"truth/{name}"], arrays["truth/rows"]) for name in _TRUTH_ARRAYS}
+        truth = [
+            FrameTruth(tick=int(tick), **{name: column[k] for name, column in columns.items()})
+            for k, tick in enumerate(ticks)
+        ]
+        required = {name: _split(arrays[f"tracks/{name}"], track_rows) for name in _TRACK_ARRAYS}
+        optional = {
+            name: _split_given(arrays[f"tracks/{name}"], track_rows, arrays[f"tracks/{name}/given"])
+            for name in _OPTIONAL_TRACK_ARRAYS
+        }
+        make: Callable[..., Tracks] = Tracks
+        tracks = [
+            make(**{name: column[k] for name, column in (required | optional).items()})
+            for k in range(len(track_rows))
+        ]
+    with_traces = "traces/ticks" in arrays
+    return EpisodeLog(
+        **{name: plain[name] for name in _PLAIN},
+        truth=tuple(truth),
+        tracks=tuple(tracks),
+        traces=TraceLog(**{f.name: arrays[f"traces/{f.name}"] for f in fields(TraceLog)})
+        if with_traces
+        else None,
+        ego_speed=speed,
+        timing_ms={
+            name.removeprefix("timing_ms/"): values
+            for name, values in arrays.items()
+            if name.startswith("timing_ms/")
+        },
+    )
+
+
+def _split(rows: NDArray[Any], counts: NDArray[np.int64]) -> list[NDArray[Any]]:
+    """Cut joined rows into frames again."""
+    if len(rows) != counts.sum():
+        raise ValueError(f"it has {len(rows)} rows where its frames count {counts.sum()}")
+    return np.split(rows, np.cumsum(counts)[:-1])
+
+
+def _split_given(
+    rows: NDArray[Any], counts: NDArray[np.int64], given: NDArray[np.bool_]
+) -> list[NDArray[Any] | None]:
+    """As `_split`, for values that some frames lack."""
+    parts = _split(rows, np.where(given, counts, 0))
+    return [part if has else None for part, has in zip(parts, given, strict=True)]

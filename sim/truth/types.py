@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameTruth:
-    """The N vehicles of which any part lies in the extended frame (the frame and its width and height around).
+    """The N vehicles of which any part lies in the extended frame (its width and height more on every side).
 
     Nothing is left out for being small or hidden: that is decided when scoring.
 
