@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from pydantic_core import ErrorDetails
 
+from scenarios.errors import InputError
 from sim.params import InCarParams, Params
 
 Seconds = Annotated[FiniteFloat, Field(gt=0, le=3600)]
@@ -24,7 +25,7 @@ _BARE_WORD = re.compile(r"[A-Za-z][\w-]*")
 _KEY = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_][\w-]*)*")
 
 
-class SpecError(ValueError):
+class SpecError(InputError):
     """A scenario that cannot be used; one line says what was wrong, what was wanted and where."""
 
 

@@ -1,0 +1,216 @@
+"""One episode: step, render, track, log. No files are read or written here."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios import bridge
+from scenarios.log import EpisodeLog, TraceLog
+from scenarios.spec import Scenario, spec_id
+from tracker.base import Diagnosable, Tracker
+from tracker.types import Diagnostics, Info, Traces, Tracks
+
+if TYPE_CHECKING:
+    from sim.simulation import Observation
+
+OnFrame = Callable[["Observation", Mapping[str, tuple[Tracks, Diagnostics]]], None]
+"""Is shown each frame with what every tracker made of it, by the tracker's name."""
+
+_Arrays = TypeVar("_Arrays", Tracks, Traces)
+_SHARED_STAGES = ("world", "render", "sensor", "truth")
+
+
+def run_episode(
+    scenario: Scenario,
+    seed: int,
+    trackers: Mapping[str, Tracker],
+    *,
+    odometry: bool = False,
+    on_frame: OnFrame | None = None,
+) -> list[EpisodeLog]:
+    """Simulate one drive and let trackers follow it: each frame is rendered once, every tracker steps on it.
+
+    Args:
+        scenario: What is driven.
+        seed: Which of its drives, >= 0.
+        trackers: By name.
+        odometry: Whether the trackers get the car's noisy odometry.
+        on_frame: Called after every frame; its time is counted in no stage.
+
+    Returns:
+        A log for each tracker, in the order of ``trackers``.
+
+    Raises:
+        RenderUnavailableError: If there is no off-screen OpenGL here.
+    """
+    from sim.scenes.in_car import InCarScene  # with the traffic, the meshes and the renderer: heavy
+    from sim.simulation import Simulation
+
+    scene = InCarScene(scenario.in_car, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
+    with Simulation(scene, scenario.in_car.sensor, seed=seed) as simulation:
+        return track_observations(
+            simulation.run(scenario.frames),
+            scenario,
+            seed,
+            trackers,
+            info=bridge.tracker_info(scene.camera, scenario.rate),
+            odometry=odometry,
+            on_frame=on_frame,
+        )
+
+
+def track_observations(
+    observations: Iterable[Observation],
+    scenario: Scenario,
+    seed: int,
+    trackers: Mapping[str, Tracker],
+    *,
+    info: Info,
+    odometry: bool = False,
+    on_frame: OnFrame | None = None,
+) -> list[EpisodeLog]:
+    """Let trackers follow observations, wherever these come from; see `run_episode`.
+
+    Observations are taken one by one and not kept: memory grows by the logs alone.
+    """
+    truths, ego_speed = [], []
+    shared_ms: dict[str, list[float]] = {stage: [] for stage in _SHARED_STAGES}
+    truth_hash, frames_hash = hashlib.sha256(), hashlib.sha256()
+    logs = {name: _TrackerLog(tracker) for name, tracker in trackers.items()}
+    for tracker in trackers.values():
+        tracker.start(info)
+
+    for observation in observations:
+        started = time.perf_counter()
+        ego = observation.state.ego
+        truths.append(observation.truth)
+        ego_speed.append(np.nan if ego is None else ego.speed)
+        _digest(truth_hash, observation.truth)
+        _digest(frames_hash, observation.image)
+        for stage in _SHARED_STAGES:
+            shared_ms[stage].append(observation.timing_ms[stage])
+        shared_ms["truth"][-1] += _milliseconds_since(started)
+
+        shown = {name: log.step(observation, odometry=odometry) for name, log in logs.items()}
+        if on_frame is not None:
+            on_frame(observation, shown)
+
+    hashes = {"truth": truth_hash.hexdigest(), "frames": frames_hash.hexdigest()}
+    return [
+        EpisodeLog(
+            scenario=scenario.name,
+            spec_id=spec_id(scenario),
+            seed=seed,
+            tracker=name,
+            rate=scenario.rate,
+            width=info.width,
+            height=info.height,
+            has_boxes=getattr(log.tracker, "has_boxes", True),
+            truth=tuple(truths),
+            tracks=tuple(log.tracks),
+            traces=log.traces.finish(),
+            ego_speed=np.array(ego_speed, float),
+            hashes={**hashes, "tracks": log.digest.hexdigest()},
+            timing_ms={
+                stage: np.array(ms, float)
+                for stage, ms in {
+                    **shared_ms,
+                    # To log a tracker is part of the loop; most of it looks up the truth of its traces.
+                    "truth": np.add(shared_ms["truth"], log.log_ms),
+                    "track": log.track_ms,
+                }.items()
+            },
+        )
+        for name, log in logs.items()
+    ]
+
+
+class _TrackerLog:
+    """Steps one tracker and keeps what it returns."""
+
+    def __init__(self, tracker: Tracker) -> None:
+        self.tracker = tracker
+        self.tracks: list[Tracks] = []
+        self.traces = _TraceRows()
+        self.digest = hashlib.sha256()
+        self.track_ms: list[float] = []
+        self.log_ms: list[float] = []
+
+    def step(self, observation: Observation, *, odometry: bool) -> tuple[Tracks, Diagnostics]:
+        frame = bridge.tracker_frame(observation, odometry=odometry)
+        started = time.perf_counter()
+        tracks = self.tracker.step(frame)
+        self.track_ms.append(_milliseconds_since(started))
+
+        started = time.perf_counter()
+        diagnostics = self.tracker.diagnostics if isinstance(self.tracker, Diagnosable) else Diagnostics()
+        tracks = _copied(tracks)
+        self.tracks.append(tracks)
+        _digest(self.digest, tracks)
+        if diagnostics.traces is not None:
+            traces = _copied(diagnostics.traces)
+            _digest(self.digest, traces)
+            self.traces.add(
+                observation.tick, traces, bridge.votes(traces, observation.ids, observation.truth)
+            )
+        self.log_ms.append(_milliseconds_since(started))
+        return tracks, diagnostics
+
+
+class _TraceRows:
+    """Gathers the rows of a `TraceLog` frame by frame."""
+
+    def __init__(self) -> None:
+        self._columns: dict[str, list[NDArray[Any]]] = {}
+
+    def add(self, tick: int, traces: Traces, votes: bridge.Votes) -> None:
+        columns: dict[str, NDArray[Any]] = {
+            "ticks": np.full(len(traces.ids), tick, np.int64),
+            "ids": traces.ids,
+            "x": traces.x,
+            "v": traces.v,
+            "labels": traces.labels,
+            "p_car": traces.p_car,
+            "owners": traces.owners,
+            "vote_ticks": np.full(len(votes.ids), tick, np.int64),
+            "vote_ids": votes.ids,
+            "vote_objects": votes.objects,
+            "vote_counts": votes.counts,
+        }
+        for name, column in columns.items():
+            self._columns.setdefault(name, []).append(column)
+
+    def finish(self) -> TraceLog | None:
+        """Return all rows; None of a tracker that never showed traces."""
+        if not self._columns:
+            return None
+        return TraceLog(**{name: np.concatenate(parts) for name, parts in self._columns.items()})
+
+
+def _copied(value: _Arrays) -> _Arrays:
+    """Return a dataclass of arrays with copies of them: a tracker may go on writing into its own."""
+    arrays: dict[str, Any] = {f.name: getattr(value, f.name) for f in fields(value)}
+    return replace(value, **{name: array.copy() for name, array in arrays.items() if array is not None})
+
+
+def _digest(digest: hashlib._Hash, value: object) -> None:
+    """Add an array, or a dataclass of arrays and numbers: names, types, shapes and bytes."""
+    named = (
+        {f.name: getattr(value, f.name) for f in fields(value)} if is_dataclass(value) else {"array": value}
+    )
+    for name, part in named.items():
+        if part is not None:
+            array = np.ascontiguousarray(part)
+            digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
+            digest.update(array.data)
+
+
+def _milliseconds_since(started: float) -> float:
+    return 1e3 * (time.perf_counter() - started)
