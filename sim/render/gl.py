@@ -1,0 +1,332 @@
+"""The fast renderer: identity, depth and colour of one frame through OpenGL 4.3."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.camera import Camera, Pose
+from sim.models import Surface
+from sim.render.context import check, context
+from sim.render.ground import MARGIN, cut, grain_texture, road_texture
+from sim.render.instances import COMMAND, INSTANCE, Library, in_bands
+from sim.render.programs import program, set_uniforms
+from sim.render.sky import HIGHEST, panorama
+from sim.render.types import Picture, Silhouettes, Stage
+from sim.textures import texture_array
+from sim.world import Bodies, WorldState
+
+_SAMPLES = 4
+_ROOM = 8192  # instances and draws in a frame
+
+_LINE_WIDTH = 0.15
+_GLOSS = {  # share of the body's colour (2: by the texture's alpha), least reflection, more of it by the alpha, glow
+    Surface.PAINT: (1.0, 0.06, 0.02, 0.0),
+    Surface.GLASS: (0.0, 0.22, 0.0, 0.0),
+    Surface.CHROME: (0.0, 0.45, 0.0, 0.0),
+    Surface.RUBBER: (0.0, 0.0, 0.0, 0.0),
+    Surface.PLASTIC: (0.0, 0.02, 0.0, 0.0),
+    Surface.PLATE: (0.0, 0.02, 0.0, 0.0),
+    Surface.TAIL_LAMP: (0.0, 0.05, 0.0, 1.0),
+    Surface.HEAD_LAMP: (0.0, 0.12, 0.0, 2.0),
+    Surface.CARGO: (1.0, 0.01, 0.0, 0.0),
+    Surface.FACADE: (0.0, 0.0, 0.25, 0.0),
+    Surface.SIGN: (2.0, 0.01, 0.0, 0.0),
+}
+
+
+class GlRenderer:
+    """Draws the world of one stage.
+
+    A frame is two passes over the same geometry: identity and depth with one sample at the pixel's centre, and colour
+    with four samples and textures. Shadows are a mask that only the ground's colour reads.
+
+    Args:
+        stage: What stands still.
+        camera: Its size fixes the targets; `render` may change focal length and principal point.
+
+    Raises:
+        RenderUnavailableError: Without off-screen OpenGL.
+    """
+
+    def __init__(self, stage: Stage, camera: Camera) -> None:
+        self._stage = stage
+        self._size = (camera.width, camera.height)
+        self._library = Library(stage.models)
+        self._ground = cut(stage.ground)
+        self._things: list[Any] = []
+        with context() as ctx:
+            self._make_buffers(ctx)
+            self._make_targets(ctx)
+            self._make_textures(ctx)
+            self._make_programs(ctx)
+            check(ctx, "setting up the renderer")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the graphics memory back. A second call does nothing."""
+        with context():
+            while self._things:
+                self._things.pop().release()
+
+    def render(self, state: WorldState, camera: Camera, pose: Pose) -> Picture:
+        """Draw one frame.
+
+        Args:
+            state: The vehicles.
+            camera: Of the size given to the constructor.
+            pose: The camera's pose.
+
+        Raises:
+            RenderError: If OpenGL reports an error.
+        """
+        bodies = Bodies.concatenate(self._stage.scenery, state.vehicles)
+        selection = in_bands(self._library, bodies, self._library.select(bodies, camera, pose), pose)
+        instances = self._library.instances(bodies, selection, pose)
+        commands = self._library.commands(selection.meshes)
+        stretches = self._ground.select(camera, pose)
+        view = view_matrices(camera, pose)
+        with context() as ctx:
+            self._instances.write(instances)
+            self._commands.write(commands)
+            self._stretches.write(self._ground.stretches(stretches, pose))
+            self._ground_commands.write(self._ground.commands(stretches))
+            draws = (len(commands), len(stretches))
+            ids, depth = self._truth_pass(ctx, view, draws)
+            self._shadow_pass(ctx, view, draws, pose)
+            colour = self._colour_pass(ctx, view, draws, camera, pose)
+            check(ctx, "rendering")
+        return Picture(colour=colour, ids=ids, depth=depth)
+
+    def _truth_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int]) -> tuple[Any, Any]:
+        width, height = self._size
+        self._truth.use()
+        ctx.enable_only(ctx.DEPTH_TEST | ctx.CULL_FACE)
+        ctx.front_face = "cw"
+        self._truth.clear()
+        for shader in (self._body_truth, self._ground_truth):
+            set_uniforms(shader, **view)
+        self._body_truth_array.render_indirect(self._commands, count=draws[0])
+        self._ground_truth_array.render_indirect(self._ground_commands, count=draws[1])
+        ids = np.frombuffer(self._truth.read(components=1, attachment=0, dtype="u4"), np.uint32)
+        depth = np.frombuffer(self._truth.read(components=1, attachment=1, dtype="f4"), np.float32)
+        depth = np.where(ids == 0, np.float32(np.inf), depth)
+        return ids.reshape(height, width), depth.reshape(height, width)
+
+    def _shadow_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int], pose: Pose) -> None:
+        self._mask.use()
+        self._mask.clear()
+        sun = self._stage.light.sun
+        if sun[2] <= 0.05 or not self._stage.light.sun_colour.any():
+            return
+        ctx.enable_only(ctx.NOTHING)
+        set_uniforms(self._body_shadow, **view, u_sun=tuple(sun), u_ground=-float(pose.position[2]))
+        self._body_shadow_array.render_indirect(self._commands, count=draws[0])
+
+    def _colour_pass(
+        self, ctx: Any, view: dict[str, Any], draws: tuple[int, int], camera: Camera, pose: Pose
+    ) -> NDArray[np.uint8]:
+        width, height = self._size
+        self._colour.use()
+        ctx.enable_only(ctx.DEPTH_TEST | ctx.CULL_FACE)
+        self._colour.clear()
+        for shader in (self._body_colour, self._ground_colour):
+            set_uniforms(shader, **view)
+        self._texture_array.use(0)
+        self._grain.use(1)
+        self._road.use(2)
+        self._mask_texture.use(3)
+        self._panorama.use(4)
+        self._body_colour_array.render_indirect(self._commands, count=draws[0])
+        self._ground_colour_array.render_indirect(self._ground_commands, count=draws[1])
+        ctx.depth_func = "<="
+        right, down, ahead = pose.rotation
+        look = np.stack(
+            [
+                right * (0.5 * width / camera.focal),
+                down * (0.5 * height / camera.focal),
+                ahead
+                + right * ((0.5 * width - camera.cx) / camera.focal)
+                + down * ((0.5 * height - camera.cy) / camera.focal),
+            ]
+        )
+        self._sky["u_look"].write(look.astype("<f4").tobytes())
+        self._sky_array.render(vertices=3)
+        ctx.depth_func = "<"
+        ctx.copy_framebuffer(self._resolved, self._colour)
+        rgba = np.frombuffer(self._resolved.read(components=4), np.uint8).reshape(height, width, 4)
+        return np.ascontiguousarray(rgba[..., :3])
+
+    def silhouettes(self, state: WorldState, camera: Camera, pose: Pose) -> Silhouettes:
+        """Draw each vehicle alone, as the identity pass draws it."""
+        raise NotImplementedError
+
+    def _keep(self, thing: Any) -> Any:
+        self._things.append(thing)
+        return thing
+
+    def _make_buffers(self, ctx: Any) -> None:
+        keep = self._keep
+        self._vertices = keep(ctx.buffer(self._library.vertices.tobytes()))
+        self._faces = keep(ctx.buffer(self._library.faces.tobytes()))
+        self._instances = keep(ctx.buffer(reserve=_ROOM * INSTANCE.itemsize, dynamic=True))
+        self._commands = keep(ctx.buffer(reserve=_ROOM * COMMAND.itemsize, dynamic=True))
+        chunks = len(self._ground.first)
+        self._ground_vertices = keep(ctx.buffer(self._ground.vertices.tobytes()))
+        self._ground_faces = keep(ctx.buffer(self._ground.faces.tobytes()))
+        self._stretches = keep(ctx.buffer(reserve=chunks * 16, dynamic=True))
+        self._ground_commands = keep(ctx.buffer(reserve=chunks * COMMAND.itemsize, dynamic=True))
+
+    def _make_targets(self, ctx: Any) -> None:
+        keep, size = self._keep, self._size
+        self._truth = keep(
+            ctx.framebuffer(
+                [keep(ctx.renderbuffer(size, 1, dtype="u4")), keep(ctx.renderbuffer(size, 1, dtype="f4"))],
+                keep(ctx.depth_renderbuffer(size)),
+            )
+        )
+        self._colour = keep(
+            ctx.framebuffer(
+                [keep(ctx.renderbuffer(size, 4, samples=_SAMPLES))],
+                keep(ctx.depth_renderbuffer(size, samples=_SAMPLES)),
+            )
+        )
+        self._resolved = keep(ctx.framebuffer([keep(ctx.renderbuffer(size, 4))]))
+        self._mask_texture = keep(ctx.texture(size, 1))
+        self._mask_texture.repeat_x = self._mask_texture.repeat_y = False
+        self._mask = keep(ctx.framebuffer([self._mask_texture]))
+
+    def _make_textures(self, ctx: Any) -> None:
+        keep, light = self._keep, self._stage.light
+        layers = texture_array()
+        self._texture_array = keep(
+            ctx.texture_array((layers.shape[2], layers.shape[1], len(layers)), 4, layers.tobytes())
+        )
+        self._grain = self._mapped(ctx, grain_texture(light.seed))
+        self._road = self._mapped(ctx, road_texture(self._stage.ground, light.seed))
+        self._texture_array.build_mipmaps()
+        self._texture_array.filter = (ctx.LINEAR_MIPMAP_LINEAR, ctx.LINEAR)
+        painted = panorama(light)
+        self._panorama = keep(ctx.texture(painted.shape[1::-1], 3, painted.tobytes(), alignment=1))
+        self._panorama.repeat_y = False
+
+    def _mapped(self, ctx: Any, image: NDArray[np.uint8]) -> Any:
+        texture = self._keep(ctx.texture(image.shape[1::-1], 4, image.tobytes()))
+        texture.build_mipmaps()
+        texture.filter = (ctx.LINEAR_MIPMAP_LINEAR, ctx.LINEAR)
+        return texture
+
+    def _make_programs(self, ctx: Any) -> None:
+        keep, stage, light = self._keep, self._stage, self._stage.light
+        self._body_truth = keep(program(ctx, "body", "truth", "TRUTH"))
+        self._body_truth_array = self._bodies(ctx, self._body_truth, "3f 24x", "3f 2f 3f 4x 1u/i", "i_id")
+        self._body_shadow = keep(program(ctx, "body", "mask", "SHADOW"))
+        self._body_shadow_array = self._bodies(ctx, self._body_shadow, "3f 24x", "3f 2f 3f 8x/i")
+        self._body_colour = keep(program(ctx, "body", "body", "COLOUR", shared=("light",)))
+        self._body_colour_array = keep(
+            ctx.vertex_array(
+                self._body_colour,
+                [
+                    (self._vertices, "3f 3f 2f 1f", "in_position", "in_normal", "in_uv", "in_surface"),
+                    (self._instances, "3f 2f 3f 4f1 4x/i", "i_position", "i_turn", "i_scale", "i_colour"),
+                ],
+                self._faces,
+            )
+        )
+        self._ground_truth = keep(program(ctx, "ground", "truth", "TRUTH"))
+        self._ground_truth_array = keep(
+            ctx.vertex_array(
+                self._ground_truth,
+                [(self._ground_vertices, "3f 8x", "in_position"), (self._stretches, "3f 4x/i", "i_offset")],
+                self._ground_faces,
+            )
+        )
+        self._ground_colour = keep(program(ctx, "ground", "ground", shared=("light",)))
+        self._ground_colour_array = keep(
+            ctx.vertex_array(
+                self._ground_colour,
+                [
+                    (self._ground_vertices, "3f 2f", "in_position", "in_road"),
+                    (self._stretches, "3f 1f/i", "i_offset", "i_arc"),
+                ],
+                self._ground_faces,
+            )
+        )
+        self._sky = keep(program(ctx, "screen", "sky", shared=("light",)))
+        self._sky_array = keep(ctx.vertex_array(self._sky, []))
+        lit = {
+            "u_sun": tuple(light.sun),
+            "u_sun_colour": tuple(light.sun_colour),
+            "u_zenith": tuple(light.zenith),
+            "u_horizon": tuple(light.horizon),
+            "u_haze": light.haze,
+        }
+        for shader in (self._body_colour, self._ground_colour, self._sky):
+            set_uniforms(shader, **lit, u_textures=0, u_grain=1, u_road=2, u_shadow=3, u_panorama=4)
+        table = np.zeros((len(Surface), 4), "<f4")
+        for surface, row in _GLOSS.items():
+            table[surface] = row
+        set_uniforms(self._body_colour, u_material=table.tobytes())
+        lines = line_table(stage.ground.lane_edges, stage.ground.line_styles)
+        set_uniforms(
+            self._ground_colour,
+            u_line=np.vstack([lines, np.zeros((24 - len(lines), 3))]).astype("<f4").tobytes(),
+            u_lines=len(lines),
+            u_paved=stage.ground.paved,
+            u_margin=MARGIN,
+        )
+        set_uniforms(self._sky, u_highest=HIGHEST)
+
+    def _bodies(self, ctx: Any, shader: Any, vertex: str, instance: str, *more: str) -> Any:
+        return self._keep(
+            ctx.vertex_array(
+                shader,
+                [
+                    (self._vertices, vertex, "in_position"),
+                    (self._instances, instance, "i_position", "i_turn", "i_scale", *more),
+                ],
+                self._faces,
+            )
+        )
+
+
+def view_matrices(camera: Camera, pose: Pose) -> dict[str, Any]:
+    """Return the uniforms of a view: ``u_clip`` from camera-relative world metres to clip space, and ``u_forward``.
+
+    Image rows run downward and so do the target's: row 0 is the first that is read back, and nothing is flipped.
+    """
+    near, far = camera.near, camera.far
+    projection = np.array(
+        [
+            [2 * camera.focal / camera.width, 0, 2 * camera.cx / camera.width - 1, 0],
+            [0, 2 * camera.focal / camera.height, 2 * camera.cy / camera.height - 1, 0],
+            [0, 0, (far + near) / (far - near), -2 * far * near / (far - near)],
+            [0, 0, 1, 0],
+        ]
+    )
+    turned = np.eye(4)
+    turned[:3, :3] = pose.rotation
+    clip = projection @ turned
+    return {"u_clip": clip.T.astype("<f4").tobytes(), "u_forward": tuple(pose.rotation[2])}
+
+
+def line_table(edges: NDArray[np.float64], styles: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Turn a ground's lines into what its shader reads: offset, half width (negative where dashed), yellow."""
+    rows = []
+    for edge, style in zip(edges, styles, strict=True):
+        half = 0.5 * _LINE_WIDTH
+        if style == 4:
+            rows += [(edge - 0.15, half, 1.0), (edge + 0.15, half, 1.0)]
+        elif style:
+            rows.append((edge, -half if style == 2 else half, float(style == 3)))
+    return np.array(rows).reshape(-1, 3)

@@ -1,0 +1,59 @@
+// Places an instance of a model in front of the camera. Positions are relative to the camera, on the world's axes.
+in vec3 in_position;
+in vec3 i_position;
+in vec2 i_turn;
+in vec3 i_scale;
+uniform mat4 u_clip;
+invariant gl_Position;
+
+vec3 turned(vec3 v) {
+    return vec3(i_turn.x * v.x - i_turn.y * v.y, i_turn.y * v.x + i_turn.x * v.y, v.z);
+}
+
+#ifdef TRUTH
+in uint i_id;
+uniform vec3 u_forward;
+flat out uint v_id;
+out float v_depth;
+
+void main() {
+    vec3 at = i_position + turned(in_position * i_scale);
+    gl_Position = u_clip * vec4(at, 1.0);
+    v_depth = dot(u_forward, at);
+    v_id = i_id;
+}
+#endif
+
+#ifdef SHADOW
+// The shadow on the flat ground: slid along the sun's ray, down to the height of the ground below the camera.
+uniform vec3 u_sun;
+uniform float u_ground;
+
+void main() {
+    vec3 at = i_position + turned(in_position * i_scale);
+    at -= u_sun * (max(at.z - u_ground, 0.0) / u_sun.z);
+    gl_Position = u_clip * vec4(at, 1.0);
+}
+#endif
+
+#ifdef COLOUR
+in vec3 in_normal;
+in vec2 in_uv;
+in float in_surface;
+in vec4 i_colour;
+out vec3 v_at;
+out vec3 v_normal;
+out vec3 v_uv;
+flat out vec4 v_colour;
+out float v_height;
+
+void main() {
+    vec3 local = in_position * i_scale;
+    v_at = i_position + turned(local);
+    v_normal = turned(in_normal / i_scale);
+    v_uv = vec3(in_uv, in_surface);
+    v_colour = i_colour;
+    v_height = local.z;
+    gl_Position = u_clip * vec4(v_at, 1.0);
+}
+#endif
