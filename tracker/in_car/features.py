@@ -1,0 +1,188 @@
+"""What is seen in one frame: the working picture, its horizontal segments, corners and lamps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker.in_car import segments
+
+Floats = NDArray[np.float64]
+
+WORKING_WIDTH = 640
+# Lamps are searched where the mean brightness lies below this, in full below the half of it.
+DUSK = 80.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """A frame made small and single-channelled.
+
+    Attributes:
+        grey: (h, w) uint8, brightness that leans to red, so that tail lamps and red cars stay visible.
+        scale: Original px per working px.
+        brightness: Mean of ``grey``.
+    """
+
+    grey: NDArray[np.uint8]
+    scale: float
+    brightness: float
+
+    @property
+    def night(self) -> float:
+        """How dark it is, 0 (day) to 1 (night), a continuous measure."""
+        return float(np.clip(2.0 - 2.0 * self.brightness / DUSK, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Features:
+    """The features of one frame, in working px from the picture's upper left corner.
+
+    Attributes:
+        segments: (M, 6), see `tracker.in_car.segments.find_segments`.
+        lamps: (L, 3) x, y, contrast of intensity peaks; none by day.
+    """
+
+    segments: Floats
+    lamps: Floats
+
+
+def working_picture(image: NDArray[np.uint8]) -> Picture:
+    """Make a frame (H, W, 3) RGB small (about 640 px wide) and single-channelled."""
+    height, width = image.shape[:2]
+    scale = max(1.0, width / WORKING_WIDTH)
+    if scale > 1.0:
+        size = (round(width / scale), round(height / scale))
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+    grey = np.asarray(cv2.transform(image, np.array([[0.45, 0.40, 0.15]])), np.uint8).reshape(image.shape[:2])
+    return Picture(grey=grey, scale=width / grey.shape[1], brightness=float(cv2.mean(grey)[0]))
+
+
+def find_features(picture: Picture, top: int, bottom: int) -> Features:
+    """Find the features in rows [top, bottom) of a picture."""
+    band = picture.grey[top:bottom]
+    derivative = segments.vertical_derivative(band)
+    found = segments.find_segments(derivative, segments.edge_threshold(derivative))
+    found[:, segments.Y] += top
+    lamps = find_lamps(band, picture.night)
+    lamps[:, 1] += top
+    return Features(segments=found, lamps=lamps)
+
+
+@njit(cache=True)
+def _peaks(smooth, surround, least, radius, limit):  # type: ignore[no-untyped-def]
+    height, width = smooth.shape
+    table = np.empty((limit, 3), np.float64)
+    used = 0
+    for row in range(radius, height - radius):
+        for column in range(radius, width - radius):
+            value = smooth[row, column]
+            contrast = value - surround[row, column]
+            if contrast < least:
+                continue
+            highest = True
+            for i in range(row - radius, row + radius + 1):
+                for j in range(column - radius, column + radius + 1):
+                    # Of equal neighbours the first in reading order wins.
+                    earlier = i < row or (i == row and j < column)
+                    if smooth[i, j] > value or (earlier and smooth[i, j] == value):
+                        highest = False
+                        break
+                if not highest:
+                    break
+            if highest and used < limit:
+                table[used, 0] = column + 0.5
+                table[used, 1] = row + 0.5
+                table[used, 2] = contrast
+                used += 1
+    return table[:used]
+
+
+def find_lamps(grey: NDArray[np.uint8], night: float, *, contrast: float = 30.0, limit: int = 400) -> Floats:
+    """Find intensity peaks: lamps against the dark (paper 1, Fig. 6c).
+
+    Args:
+        grey: (H, W).
+        night: How dark it is, [0, 1]; at 0 there are no lamps, and the less night, the more contrast is asked for.
+        contrast: Grey levels above the mean of the surroundings, at full night.
+        limit: Peaks returned at most.
+
+    Returns:
+        (L, 3): x, y, contrast.
+    """
+    if night <= 0.0:
+        return np.zeros((0, 3))
+    smooth = np.asarray(cv2.blur(grey, (3, 3)), np.int16)
+    surround = np.asarray(cv2.blur(grey, (17, 17)), np.int16)
+    found: Floats = _peaks(smooth, surround, contrast / night, 3, limit)
+    return found
+
+
+@njit(cache=True)
+def _select(response, least, fine, coarse, row_fine_from, row_fine_to, taken, limit):  # type: ignore[no-untyped-def]
+    height, width = response.shape
+    places = np.empty((limit, 2), np.float32)
+    used = 0
+    row = 0
+    while row < height:
+        cell = fine if row_fine_from <= row < row_fine_to else coarse
+        lower = min(row + cell, height)
+        column = 0
+        while column < width:
+            right = min(column + cell, width)
+            best, best_i, best_j, free = least, -1, -1, True
+            for i in range(row, lower):
+                for j in range(column, right):
+                    if taken[i, j] != 0:
+                        free = False
+                        break
+                    if response[i, j] > best:
+                        best = response[i, j]
+                        best_i, best_j = i, j
+                if not free:
+                    break
+            if free and best_i >= 0 and used < limit:
+                places[used, 0] = best_j
+                places[used, 1] = best_i
+                used += 1
+            column = right
+        row = lower
+    return places[:used]
+
+
+def find_corners(
+    grey: NDArray[np.uint8],
+    taken: NDArray[np.uint8],
+    fine_rows: tuple[int, int],
+    *,
+    least: float = 4e-4,
+    fine: int = 6,
+    coarse: int = 16,
+    limit: int = 400,
+) -> NDArray[np.float32]:
+    """Find corners, the best one of each free cell of a grid.
+
+    The smaller eigenvalue of the structure tensor counts: along an edge that points at the focus of expansion a point seems to
+    stand still like a car, so an edge alone is no feature.
+
+    Args:
+        grey: (H, W).
+        taken: (H, W), non-zero at points that are tracked already; their cells get no new point.
+        fine_rows: Rows with the fine grid, where far vehicles lie.
+        least: Least eigenvalue, in cv2's units for pictures scaled to [0, 1].
+        fine: Cell of the fine grid, px.
+        coarse: Cell elsewhere, px.
+        limit: Corners returned at most.
+
+    Returns:
+        (N, 2) float32 x, y with pixel centres at integers, as cv2's optical flow wants them.
+    """
+    response = cv2.cornerMinEigenVal(grey, 3, ksize=3)
+    found: NDArray[np.float32] = _select(
+        response, least, fine, coarse, fine_rows[0], fine_rows[1], taken, limit
+    )
+    return found

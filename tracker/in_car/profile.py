@@ -1,0 +1,213 @@
+"""Vertical condensing: features of a frame summed down the columns into one-dimensional profiles (paper 1, section III).
+
+The paper merges whatever stands above one x. Here the segments are first gathered into clusters that agree in x and lie close
+together in y, so that a pole before a far car, or two cars in line, keep centres of their own; the profile stays what
+decides whether a centre is strong enough to be one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker.in_car import segments as seg
+from tracker.in_car.features import Features, Picture
+
+Floats = NDArray[np.float64]
+Profile = NDArray[np.float32]
+
+SEGMENT, LAMP = 0, 1
+# Smoothing of the profiles, px at a width of 640 (paper 1, Fig. 7).
+SMOOTHING = 4.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Centres:
+    """The N centres of feature clusters in one frame, working px.
+
+    Attributes:
+        x: (N,) weighted middle.
+        y: (N,) weighted mean row.
+        width: (N,) px.
+        weight: (N,) strength on the profile.
+        kind: (N,) uint8, `SEGMENT` or `LAMP`.
+        points: (K, 2) the image points of the features behind the centres.
+        owners: (K,) index of the centre that a point belongs to.
+    """
+
+    x: Floats
+    y: Floats
+    width: Floats
+    weight: Floats
+    kind: NDArray[np.uint8]
+    points: Floats
+    owners: NDArray[np.int64]
+
+
+def band_rows(horizon: float, height: int, width: int) -> tuple[int, int]:
+    """Return the rows [top, bottom) in which vehicles show, by p(x, y | C) (`tracker.in_car.occurrence`).
+
+    From the roof of a lorry at mid-range above the horizon down to the ground some five metres ahead; in units of the
+    picture's width, since the focal length scales with it.
+    """
+    top = int(np.clip(horizon - 0.12 * width, 0, height - 16))
+    bottom = int(np.clip(horizon + 0.30 * width, top + 16, height))
+    return top, bottom
+
+
+def condense(spans: Floats, weights: Floats, width: int) -> Profile:
+    """Sum weighted spans [x0, x1) over the columns.
+
+    Args:
+        spans: (M, 2) px.
+        weights: (M,).
+        width: Columns.
+
+    Returns:
+        (width,) profile: at each column the weights of the spans that cover it.
+    """
+    start = np.clip(spans[:, 0].astype(np.int64), 0, width)
+    end = np.clip(spans[:, 1].astype(np.int64), 0, width)
+    steps = np.bincount(start, weights, width + 1) - np.bincount(end, weights, width + 1)
+    return np.cumsum(steps)[:width].astype(np.float32)
+
+
+def smooth(profile: Profile, sigma: float) -> Profile:
+    """Smooth a profile with a Gaussian, px."""
+    return np.asarray(
+        cv2.GaussianBlur(profile[None], (0, 0), sigma, borderType=cv2.BORDER_REPLICATE), np.float32
+    )[0]
+
+
+def intensity(picture: Picture, top: int, bottom: int) -> Profile:
+    """Return the mean intensity of every column over rows [top, bottom): (W,)."""
+    return np.asarray(cv2.reduce(picture.grey[top:bottom], 0, cv2.REDUCE_AVG, dtype=cv2.CV_32F), np.float32)[
+        0
+    ]
+
+
+@njit(cache=True)
+def _cluster(x0, x1, y):  # type: ignore[no-untyped-def]
+    """Union-find over segments that share their middle and lie close in y."""
+    total = x0.size
+    parent = np.arange(total)
+    for i in range(total):
+        for j in range(i):
+            length_i, length_j = x1[i] - x0[i], x1[j] - x0[j]
+            longer, shorter = max(length_i, length_j), min(length_i, length_j)
+            if shorter < 0.4 * longer or abs(y[i] - y[j]) > 0.45 * longer + 2.0:
+                continue
+            if abs(x0[i] + x1[i] - x0[j] - x1[j]) > 0.4 * longer:
+                continue
+            a, b = i, j
+            while parent[a] != a:
+                a = parent[a]
+            while parent[b] != b:
+                b = parent[b]
+            parent[max(a, b)] = min(a, b)
+    for i in range(total):
+        root = i
+        while parent[root] != root:
+            root = parent[root]
+        parent[i] = root
+    return parent
+
+
+@njit(cache=True)
+def local_maxima(profile, least, radius):  # type: ignore[no-untyped-def]
+    """Return the columns where a profile is at least ``least`` and highest within ``radius``; the first of a plateau."""
+    places = np.empty(profile.size, np.int64)
+    used = 0
+    for column in range(profile.size):
+        value = profile[column]
+        if value < least:
+            continue
+        highest = True
+        for other in range(max(0, column - radius), min(profile.size, column + radius + 1)):
+            if profile[other] > value or (other < column and profile[other] == value):
+                highest = False
+                break
+        if highest:
+            places[used] = column
+            used += 1
+    return places[:used]
+
+
+def find_centres(
+    features: Features,
+    segment_profile: Profile,
+    horizon: float,
+    *,
+    longest: float = 2.8,
+    share: float = 0.6,
+    reach: float = 6.0,
+    layers: int = 3,
+    stack: int = 3,
+) -> Centres:
+    """Gather features into centres.
+
+    Args:
+        features: Of the frame.
+        segment_profile: (W,) smoothed profile of the segments.
+        horizon: Row of the horizon, px.
+        longest: Segments longer than this many times their height below the horizon (and 40 px) are wider than any
+            vehicle that stands there: kerbs, bridges, shadows across the road. They make no centre.
+        share: A maximum of the profile counts above this share of the profile's mean over the picture.
+        reach: A cluster belongs to a maximum this near, px.
+        layers: Clusters kept above one maximum: the strongest ones.
+        stack: A cluster of so many segments, one above the other, counts without a maximum of the whole profile: what
+            else stands in its columns may drown it.
+
+    Returns:
+        The centres.
+    """
+    found = features.segments
+    length = found[:, seg.X1] - found[:, seg.X0]
+    found = found[length <= np.maximum(longest * np.abs(found[:, seg.Y] - horizon), 40.0)]
+    x0, x1, y = found[:, seg.X0].copy(), found[:, seg.X1].copy(), found[:, seg.Y].copy()
+    length = x1 - x0
+    roots = _cluster(x0, x1, y)
+    _, group = np.unique(roots, return_inverse=True)
+    count = int(group.max()) + 1 if len(group) else 0
+    weight = np.bincount(group, length, count)
+    divisor = np.maximum(weight, 1e-9)
+    middle = np.bincount(group, length * 0.5 * (x0 + x1), count) / divisor
+    row = np.bincount(group, length * y, count) / divisor
+    wide = np.bincount(group, length * length, count) / divisor
+    peaks = local_maxima(segment_profile, share * float(segment_profile.mean()), round(SMOOTHING))
+    strong = _strongest(middle, weight, peaks, reach, layers) | (np.bincount(group, minlength=count) >= stack)
+    renumber = np.cumsum(strong) - 1
+    member = strong[group]
+    lamps = features.lamps
+    kept = int(strong.sum())
+    return Centres(
+        x=np.concatenate([middle[strong], lamps[:, 0]]),
+        y=np.concatenate([row[strong], lamps[:, 1]]),
+        width=np.concatenate([wide[strong], np.full(len(lamps), 6.0)]),
+        weight=np.concatenate([weight[strong], lamps[:, 2] / 4.0]),
+        kind=np.repeat(np.array([SEGMENT, LAMP], np.uint8), [kept, len(lamps)]),
+        points=np.concatenate([np.stack([0.5 * (x0 + x1), y], 1)[member], lamps[:, :2]]),
+        owners=np.concatenate([renumber[group[member]], kept + np.arange(len(lamps))]),
+    )
+
+
+def _strongest(
+    middle: Floats, weight: Floats, peaks: NDArray[np.int64], reach: float, layers: int
+) -> NDArray[np.bool_]:
+    """Choose the heaviest clusters at each maximum of the profile."""
+    chosen = np.zeros(len(middle), bool)
+    if not len(peaks) or not len(middle):
+        return chosen
+    right = np.clip(np.searchsorted(peaks, middle), 1, max(len(peaks) - 1, 1))
+    left = right - 1
+    right = np.minimum(right, len(peaks) - 1)
+    nearer = np.where(np.abs(middle - peaks[left]) <= np.abs(middle - peaks[right]), left, right)
+    order = np.lexsort((-weight, nearer))
+    first = np.searchsorted(nearer[order], nearer[order])
+    place = np.arange(len(order)) - first
+    chosen[order] = place < layers
+    return chosen & (np.abs(middle - (peaks[nearer] + 0.5)) <= reach)
