@@ -1,0 +1,5 @@
+"""Meshes of everything that stands or drives in a scene, made from proportions alone: no files, no random state."""
+
+from sim.meshes.catalogue import catalogue
+
+__all__ = ["catalogue"]

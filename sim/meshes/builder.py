@@ -1,0 +1,266 @@
+"""Collects polygons and turns them into a `Mesh` with smooth normals and texture coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim.models import Mesh, Surface
+
+Floats = NDArray[np.float64]
+
+CREASE = np.radians(38.0)
+"""Faces that meet at a sharper angle keep an edge between them."""
+
+METRES_PER_REPEAT = {
+    Surface.FOLIAGE: 2.4,
+    Surface.BARK: 1.2,
+    Surface.CONCRETE: 4.0,
+    Surface.FACADE: 12.8,
+    Surface.ROOF: 3.0,
+    Surface.GRASS: 6.0,
+    Surface.CARGO: 4.0,
+    Surface.HILL: 60.0,
+    Surface.ASPHALT: 4.0,
+}
+"""How much of a surface one repeat of its texture covers; the others repeat every metre."""
+
+
+class MeshBuilder:
+    """A soup of textured triangles in a model's frame: x ahead, y to the left, z up."""
+
+    def __init__(self) -> None:
+        self._triangles: list[Floats] = []
+        self._uvs: list[Floats] = []
+        self._surfaces: list[int] = []
+        self._normals: list[Floats | None] = []
+
+    def __len__(self) -> int:
+        return len(self._triangles)
+
+    def polygon(
+        self,
+        points: ArrayLike,
+        surface: Surface,
+        *,
+        facing: ArrayLike | None = None,
+        uv: ArrayLike | None = None,
+        normals: ArrayLike | None = None,
+    ) -> None:
+        """Add a convex polygon as a fan.
+
+        Args:
+            points: (N, 3) metres, counter-clockwise from outside, or in either order when ``facing`` is given.
+            surface: What it is made of.
+            facing: (3,) a direction on its outer side.
+            uv: (N, 2) texture coordinates; by default the polygon is laid flat on the texture.
+            normals: (N, 3) unit normals; by default those of the faces, smoothed when the mesh is built.
+        """
+        corners = np.asarray(points, float)
+        ring = np.roll(corners, -1, axis=0)
+        normal = np.cross(corners - corners[0], ring - corners[0]).sum(axis=0)
+        flip = facing is not None and float(normal @ np.asarray(facing, float)) < 0
+        flat = planar_uv(corners, -normal if flip else normal, surface) if uv is None else np.asarray(uv, float)
+        shading = None if normals is None else np.asarray(normals, float)
+        order = np.arange(len(corners))[::-1] if flip else np.arange(len(corners))
+        for i in range(1, len(order) - 1):
+            pick = order[[0, i, i + 1]]
+            if np.linalg.norm(np.cross(corners[pick[1]] - corners[pick[0]], corners[pick[2]] - corners[pick[0]])) < 1e-7:
+                continue
+            self._triangles.append(corners[pick])
+            self._uvs.append(flat[pick])
+            self._surfaces.append(int(surface))
+            self._normals.append(None if shading is None else shading[pick])
+
+    def decal(self, points: ArrayLike, surface: Surface, *, facing: ArrayLike, lift: float = 0.012) -> None:
+        """Add a quadrilateral that lies ``lift`` metres above a surface and shows its texture once.
+
+        Args:
+            points: (4, 3) lower left, lower right, upper right, upper left as seen from outside.
+            surface: What it is made of.
+            facing: (3,) direction in which it looks.
+            lift: Metres along its normal.
+        """
+        corners = np.asarray(points, float)
+        normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
+        normal *= np.sign(normal @ np.asarray(facing, float)) / np.linalg.norm(normal)
+        self.polygon(corners + lift * normal, surface, facing=facing, uv=[(0, 0), (1, 0), (1, 1), (0, 1)])
+
+    def box(
+        self,
+        lower: Sequence[float],
+        upper: Sequence[float],
+        surface: Surface,
+        *,
+        without: str = "",
+        unit_uv: bool = False,
+    ) -> None:
+        """Add an axis-aligned box.
+
+        Args:
+            lower: (3,) its smallest corner.
+            upper: (3,) its largest corner.
+            surface: What it is made of.
+            without: Sides to leave out, two characters each, such as ``"-z+x"``.
+            unit_uv: Whether each side shows the texture once.
+        """
+        ends = np.array([lower, upper], float)
+        skipped = {without[i : i + 2] for i in range(0, len(without), 2)}
+        for axis in range(3):
+            for side, sign in ((0, "-"), (1, "+")):
+                if sign + "xyz"[axis] in skipped:
+                    continue
+                first, second = (axis + 1) % 3, (axis + 2) % 3
+                corners = np.empty((4, 3))
+                corners[:, axis] = ends[side, axis]
+                corners[:, first] = ends[[0, 1, 1, 0], first]
+                corners[:, second] = ends[[0, 0, 1, 1], second]
+                facing = np.zeros(3)
+                facing[axis] = 2 * side - 1
+                uv = [(0, 0), (1, 0), (1, 1), (0, 1)] if unit_uv else None
+                self.polygon(corners, surface, facing=facing, uv=uv)
+
+    def grid(self, points: ArrayLike, surface: Surface | NDArray[np.uint8], *, inside: ArrayLike) -> None:
+        """Add a patch of quadrilaterals over a lattice of points.
+
+        Args:
+            points: (M, N, 3) metres.
+            surface: One for all, or (M - 1, N - 1), one a cell.
+            inside: (3,) or (M - 1, N - 1, 3) a point on the patch's inner side.
+        """
+        lattice = np.asarray(points, float)
+        rows, columns = lattice.shape[0] - 1, lattice.shape[1] - 1
+        kinds = np.broadcast_to(np.asarray(surface, np.uint8), (rows, columns))
+        within = np.broadcast_to(np.asarray(inside, float), (rows, columns, 3))
+        for i in range(rows):
+            for j in range(columns):
+                quad = lattice[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
+                self.polygon(quad, Surface(int(kinds[i, j])), facing=quad.mean(axis=0) - within[i, j])
+
+    def prism(
+        self,
+        start: Sequence[float],
+        end: Sequence[float],
+        radii: tuple[float, float],
+        surface: Surface,
+        *,
+        sides: int = 6,
+        caps: bool = False,
+    ) -> None:
+        """Add a round bar, tapering from ``radii[0]`` at ``start`` to ``radii[1]`` at ``end``."""
+        foot, head = np.asarray(start, float), np.asarray(end, float)
+        axis = (head - foot) / np.linalg.norm(head - foot)
+        across = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
+        across /= np.linalg.norm(across)
+        other = np.cross(axis, across)
+        turn = 2 * np.pi * np.arange(sides + 1) / sides
+        ring = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * other
+        low, high = foot + radii[0] * ring, head + radii[1] * ring
+        self.grid(np.stack([low, high]), surface, inside=(foot + head) / 2)
+        if caps:
+            self.polygon(low[:-1], surface, facing=-axis)
+            self.polygon(high[:-1], surface, facing=axis)
+
+    def wheel(self, centre: Sequence[float], radius: float, width: float, *, sides: int, outer: int) -> None:
+        """Add a wheel across y whose outer face looks toward ``outer`` (+1 left, -1 right)."""
+        turn = 2 * np.pi * (np.arange(sides) + 0.5) / sides
+        # The flats of the polygon stand on the ground.
+        ring = np.stack([np.sin(turn), -np.cos(turn)], axis=1) / np.cos(np.pi / sides)
+        rim = np.zeros((sides, 3))
+        rim[:, [0, 2]] = np.asarray(centre, float)[[0, 2]] + radius * ring
+        faces = {side: rim + np.array([0.0, centre[1] + side * width / 2, 0.0]) for side in (-1, 1)}
+        disc = 0.5 + 0.5 * ring / np.abs(ring).max()
+        tread = np.full((4, 2), 0.02)
+        self.polygon(faces[outer], Surface.RUBBER, facing=(0, outer, 0), uv=disc)
+        self.polygon(faces[-outer], Surface.RUBBER, facing=(0, -outer, 0), uv=np.full((sides, 2), 0.02))
+        for i in range(sides):
+            j = (i + 1) % sides
+            quad = np.stack([faces[-1][i], faces[1][i], faces[1][j], faces[-1][j]])
+            self.polygon(quad, Surface.RUBBER, facing=quad.mean(axis=0) - np.asarray(centre, float), uv=tread)
+
+    def build(self) -> Mesh:
+        """Return the mesh: creased normals, equal corners merged."""
+        triangles = np.array(self._triangles)
+        surfaces = np.array(self._surfaces, np.uint8)
+        normals = _creased_normals(triangles, surfaces)
+        for i, given in enumerate(self._normals):
+            if given is not None:
+                normals[i] = given
+        corners = np.concatenate(
+            [
+                triangles.reshape(-1, 3),
+                normals.reshape(-1, 3),
+                np.array(self._uvs).reshape(-1, 2),
+                np.repeat(surfaces, 3)[:, None],
+            ],
+            axis=1,
+        )
+        unique, inverse = np.unique(np.round(corners, 5), axis=0, return_inverse=True)
+        direction = unique[:, 3:6]
+        return Mesh(
+            vertices=unique[:, :3].astype(np.float32),
+            normals=(direction / np.linalg.norm(direction, axis=1, keepdims=True)).astype(np.float32),
+            uvs=unique[:, 6:8].astype(np.float32),
+            surfaces=unique[:, 8].astype(np.uint8),
+            faces=inverse.reshape(-1, 3).astype(np.int32),
+        )
+
+
+def planar_uv(points: Floats, normal: Floats, surface: Surface) -> Floats:
+    """Lay a flat polygon on its texture: u to the right and v up as seen from outside.
+
+    Args:
+        points: (N, 3) metres.
+        normal: (3,) outward, of any length.
+        surface: It decides the scale.
+
+    Returns:
+        (N, 2) texture coordinates.
+    """
+    axis = int(np.argmax(np.abs(normal)))
+    sign = 1.0 if normal[axis] > 0 else -1.0
+    if axis == 0:
+        flat = np.stack([sign * points[:, 1], points[:, 2]], axis=1)
+    elif axis == 1:
+        flat = np.stack([-sign * points[:, 0], points[:, 2]], axis=1)
+    else:
+        flat = np.stack([points[:, 0], sign * points[:, 1]], axis=1)
+    return flat / METRES_PER_REPEAT.get(surface, 1.0)
+
+
+def _creased_normals(triangles: Floats, surfaces: NDArray[np.uint8]) -> Floats:
+    """Average the normals of the faces that share a corner and a surface and meet at less than the crease."""
+    area = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    unit = area / np.linalg.norm(area, axis=1, keepdims=True)
+    keys = np.concatenate(
+        [np.round(triangles.reshape(-1, 3) * 1e4), np.repeat(surfaces, 3)[:, None].astype(float)], axis=1
+    )
+    _, group = np.unique(keys, axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    order = np.argsort(group, kind="stable")
+    starts = np.flatnonzero(np.diff(group[order], prepend=-1))
+    normals = np.empty((len(order), 3))
+    for members in np.split(order, starts[1:]):
+        face = members // 3
+        alike = unit[face] @ unit[face].T > np.cos(CREASE)
+        normals[members] = alike @ area[face]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals.reshape(-1, 3, 3)
+
+
+def scaled_to(builder: MeshBuilder, size: tuple[float, float, float]) -> Mesh:
+    """Build a mesh and stretch it to fill ``size``, centred in x and y, its foot on the ground."""
+    mesh = builder.build()
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    factor = np.array(size) / (high - low)
+    origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
+    normals = mesh.normals / factor
+    return Mesh(
+        vertices=((mesh.vertices - origin) * factor).astype(np.float32),
+        normals=(normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32),
+        uvs=mesh.uvs,
+        surfaces=mesh.surfaces,
+        faces=mesh.faces,
+    )

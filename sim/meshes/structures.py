@@ -1,0 +1,150 @@
+"""Buildings, bridges, and what closes the horizon: woods and hills."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.meshes.builder import MeshBuilder, scaled_to
+from sim.models import Mesh, Model, Surface
+from sim.rng import stream
+from sim.world import Kind
+
+_SEED = 20110603
+
+FLOOR = 3.2
+"""Height of a storey, metres; also the width of a window's bay."""
+
+
+def structure_models() -> tuple[Model, ...]:
+    """Make buildings, bridges, distant woods and hills."""
+    houses = tuple(
+        Model(name=name, kind=Kind.BUILDING, size=size, lods=(_house(size, True), _house(size, False)), switch=(90.0,))
+        for name, size in (
+            ("house-a", (9.6, 9.6, 8.6)),
+            ("house-b", (12.8, 9.6, 6.8)),
+            ("house-c", (8.0, 12.8, 10.2)),
+            ("barn", (18.0, 11.0, 8.0)),
+        )
+    )
+    blocks = tuple(
+        Model(name=name, kind=Kind.BUILDING, size=size, lods=(_block(size, True), _block(size, False)), switch=(90.0,))
+        for name, size in (
+            ("block-a", (19.2, 12.8, 16.6)),
+            ("block-b", (25.6, 12.8, 10.2)),
+            ("block-c", (16.0, 16.0, 23.0)),
+            ("hall", (38.4, 22.4, 8.0)),
+        )
+    )
+    bridges = (
+        Model(name="bridge-a", kind=Kind.BRIDGE, size=(10.0, 60.0, 7.4), lods=(_bridge((10.0, 60.0, 7.4)),)),
+        Model(name="bridge-b", kind=Kind.BRIDGE, size=(6.0, 60.0, 7.0), lods=(_bridge((6.0, 60.0, 7.0)),)),
+    )
+    woods = tuple(
+        Model(name=f"woods-{letter}", kind=Kind.TREE, size=(120.0, 14.0, 13.0), lods=(_woods(letter),)) for letter in "abc"
+    )
+    hills = tuple(
+        Model(name=f"hill-{letter}", kind=Kind.HILL, size=(900.0, 260.0, 60.0), lods=(_hill(letter),)) for letter in "abc"
+    )
+    return houses + blocks + bridges + woods + hills
+
+
+def _house(size: tuple[float, float, float], detail: bool) -> Mesh:
+    length, width, height = size
+    builder = MeshBuilder()
+    eave = height - 0.36 * width
+    half_x, half_y = length / 2 - 0.3, width / 2 - 0.4
+    builder.box((-half_x, -half_y, 0), (half_x, half_y, eave), Surface.FACADE, without="-z+z")
+    for sign in (1, -1):
+        gable = [(sign * half_x, -half_y, eave), (sign * half_x, half_y, eave), (sign * half_x, 0, height)]
+        builder.polygon(gable, Surface.CARGO, facing=(sign, 0, 0))
+        slope = [(-length / 2, sign * width / 2, eave - 0.25), (length / 2, sign * width / 2, eave - 0.25),
+                 (length / 2, 0, height), (-length / 2, 0, height)]  # fmt: skip
+        builder.polygon(slope, Surface.ROOF, facing=(0, sign, 1))
+        if detail:
+            # Underside of the eaves: a dark line between wall and roof.
+            builder.polygon(np.array(slope) - (0, 0, 0.10), Surface.PLASTIC, facing=(0, -sign, -1))
+            edge = np.array([slope[0], slope[1], (slope[1][0], slope[1][1], slope[1][2] - 0.10), (slope[0][0], slope[0][1], slope[0][2] - 0.10)])
+            builder.polygon(edge, Surface.PAINT, facing=(0, sign, 0))
+    if detail:
+        builder.box((length * 0.18, -0.35, height - 1.2), (length * 0.18 + 0.7, 0.35, height), Surface.ROOF, without="-z")
+    return scaled_to(builder, size)
+
+
+def _block(size: tuple[float, float, float], detail: bool) -> Mesh:
+    length, width, height = size
+    builder = MeshBuilder()
+    half_x, half_y = length / 2 - 0.2, width / 2 - 0.2
+    builder.box((-half_x, -half_y, 0), (half_x, half_y, height - 0.6), Surface.FACADE, without="-z")
+    builder.box((-half_x - 0.2, -half_y - 0.2, height - 0.7), (half_x + 0.2, half_y + 0.2, height), Surface.CONCRETE)
+    if detail:
+        builder.box((-half_x - 0.05, -half_y - 0.05, 0), (half_x + 0.05, half_y + 0.05, 0.5), Surface.CONCRETE, without="-z")
+        builder.box((-half_x - 0.12, -half_y - 0.12, FLOOR), (half_x + 0.12, half_y + 0.12, FLOOR + 0.25), Surface.CONCRETE)
+    return scaled_to(builder, size)
+
+
+def _bridge(size: tuple[float, float, float]) -> Mesh:
+    """Make a bridge across y; the road runs along x beneath. Its clear span is 70 % of the width."""
+    length, width, height = size
+    builder = MeshBuilder()
+    half_x, half_y = length / 2, width / 2
+    deck, soffit = height - 1.0, height - 2.2
+    builder.box((-half_x + 0.6, -half_y, soffit), (half_x - 0.6, half_y, deck), Surface.CONCRETE)
+    builder.box((-half_x, -half_y, deck - 0.3), (half_x, half_y, deck + 0.05), Surface.CONCRETE)
+    for x in (-half_x + 0.02, half_x - 0.12):
+        for z in (deck + 0.50, height - 0.06):
+            builder.box((x, -half_y, z), (x + 0.10, half_y, z + 0.06), Surface.STEEL)
+        for y in np.linspace(-half_y + 0.1, half_y - 0.1, 25):
+            builder.box((x, y - 0.04, deck), (x + 0.08, y + 0.04, height), Surface.STEEL, without="-z+z+x")
+    for sign in (1, -1):
+        inner, outer = 0.70 * half_y, half_y
+        for x in (-half_x * 0.5, half_x * 0.5):
+            builder.box((x - 0.45, min(sign * inner, sign * (inner + 0.9)), 0), (x + 0.45, max(sign * inner, sign * (inner + 0.9)), soffit), Surface.CONCRETE, without="-z+z")  # fmt: skip
+        # The embankment that carries the crossing road.
+        foot = inner + 1.0
+        slope = [(-half_x + 0.5, sign * foot, 0), (half_x - 0.5, sign * foot, 0), (half_x - 0.5, sign * (outer - 2), soffit), (-half_x + 0.5, sign * (outer - 2), soffit)]
+        builder.polygon(slope, Surface.CONCRETE, facing=(0, -sign, 1))
+        for end in (1, -1):
+            x0, x1 = end * (half_x - 0.5), end * (half_x + 0.0)
+            side = [(x0, sign * foot, 0), (x1, sign * outer, 0), (x1, sign * outer, deck - 0.4), (x0, sign * (outer - 2), soffit)]
+            builder.polygon(side, Surface.GRASS, facing=(end, 0, 0))
+    return scaled_to(builder, size)
+
+
+def _woods(letter: str) -> Mesh:
+    """Make a strip of distant wood along x: jagged crowns in two ranks, thickest in the middle."""
+    rng = stream(_SEED, "woods", letter)
+    builder = MeshBuilder()
+    count = 40
+    x = np.linspace(-60, 60, count)
+    swell = np.sqrt(np.clip(1 - (x / 62) ** 2, 0.05, 1))
+    for side in (1, -1):
+        tops = (7.5 + 4.5 * rng.uniform(-0.6, 1, count)) * swell
+        ledge = tops * rng.uniform(0.45, 0.75, count)
+        rows = np.stack(
+            [
+                np.stack([x, np.full(count, side * 7.0), np.zeros(count)], axis=1),
+                np.stack([x + rng.normal(0, 1, count), side * rng.uniform(5, 7, count), ledge], axis=1),
+                np.stack([x + rng.normal(0, 1, count), side * rng.uniform(0.5, 3, count), tops], axis=1),
+                np.stack([x, np.zeros(count), tops * 0.6], axis=1),
+            ]
+        )
+        builder.grid(rows, Surface.FOLIAGE, inside=(0, -side * 40, -60))
+    return scaled_to(builder, (120.0, 14.0, 13.0))
+
+
+def _hill(letter: str) -> Mesh:
+    """Make a ridge along x with a wavy crest."""
+    rng = stream(_SEED, "hills", letter)
+    builder = MeshBuilder()
+    count = 33
+    x = np.linspace(-450, 450, count)
+    crest = 20 * np.sqrt(np.clip(1 - (x / 455) ** 2, 0, 1))
+    for octave in range(1, 6):
+        crest += 16 / octave * np.sin(x / 900 * 2 * np.pi * octave + rng.uniform(0, 2 * np.pi)) * np.clip(1 - (x / 450) ** 2, 0, 1)
+    crest = np.clip(crest + 8, 0.0, None) * np.clip(1 - (x / 450) ** 4, 0, 1)
+    rows = []
+    for y, share in ((-130, 0.0), (-70, 0.55), (0, 1.0), (70, 0.55), (130, 0.0)):
+        wobble = rng.uniform(0.8, 1.2, count) if share < 1 else 1.0
+        rows.append(np.stack([x, np.full(count, float(y)), crest * share * wobble], axis=1))
+    builder.grid(np.stack(rows), Surface.HILL, inside=(0, 0, -400))
+    return scaled_to(builder, (900.0, 260.0, 60.0))
