@@ -35,6 +35,7 @@ def iou(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     >>> iou([[0, 0, 2, 2]], [[0, 0, 2, 2], [0, 1, 2, 3], [5, 5, 6, 6]]).round(3).tolist()
     [[1.0, 0.333, 0.0]]
     """
-    shared = intersection(a, b)
-    union = box_area(a).reshape(-1, 1) + box_area(b).reshape(1, -1) - shared
+    first, second = np.asarray(a, float).reshape(-1, 4), np.asarray(b, float).reshape(-1, 4)
+    shared = intersection(first, second)
+    union = box_area(first)[:, None] + box_area(second)[None, :] - shared
     return np.divide(shared, union, out=np.zeros_like(shared), where=union > 0)
