@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scenarios import bridge
 from scenarios.log import EpisodeLog, TraceLog
 from scenarios.spec import Scenario, spec_id
-from tracker.base import Diagnosable, Tracker
-from tracker.types import Diagnostics, Info, Traces, Tracks
+from tracker.base import Tracker
+from tracker.types import Diagnostics, Frame, Info, Traces, Tracks
 
 if TYPE_CHECKING:
     from sim.simulation import Observation
@@ -83,7 +83,7 @@ def track_observations(
     truths, ego_speed = [], []
     shared_ms: dict[str, list[float]] = {stage: [] for stage in _SHARED_STAGES}
     truth_hash, frames_hash = hashlib.sha256(), hashlib.sha256()
-    logs = {name: _TrackerLog(tracker) for name, tracker in trackers.items()}
+    logs = {name: TrackerLog(tracker) for name, tracker in trackers.items()}
     for tracker in trackers.values():
         tracker.start(info)
 
@@ -98,7 +98,10 @@ def track_observations(
             shared_ms[stage].append(observation.timing_ms[stage])
         shared_ms["truth"][-1] += _milliseconds_since(started)
 
-        shown = {name: log.step(observation, odometry=odometry) for name, log in logs.items()}
+        shown = {
+            name: log.step(bridge.tracker_frame(observation, odometry=odometry), observation)
+            for name, log in logs.items()
+        }
         if on_frame is not None:
             on_frame(observation, shown)
 
@@ -132,8 +135,17 @@ def track_observations(
     ]
 
 
-class _TrackerLog:
-    """Steps one tracker and keeps what it returns."""
+class TrackerLog:
+    """Steps one tracker and keeps what it returns.
+
+    Attributes:
+        tracker: Started by whoever made this.
+        tracks: Of each frame.
+        traces: Rows of a `TraceLog`, where the truth is known.
+        digest: SHA-256 of all tracks and traces.
+        track_ms: Milliseconds that each step took.
+        log_ms: Milliseconds that it took to keep each.
+    """
 
     def __init__(self, tracker: Tracker) -> None:
         self.tracker = tracker
@@ -143,23 +155,28 @@ class _TrackerLog:
         self.track_ms: list[float] = []
         self.log_ms: list[float] = []
 
-    def step(self, observation: Observation, *, odometry: bool) -> tuple[Tracks, Diagnostics]:
-        frame = bridge.tracker_frame(observation, odometry=odometry)
+    def step(self, frame: Frame, observation: Observation | None = None) -> tuple[Tracks, Diagnostics]:
+        """Let the tracker take a frame.
+
+        Args:
+            frame: What it is given.
+            observation: With the truth that its traces are scored by; None for a recording.
+        """
         started = time.perf_counter()
         tracks = self.tracker.step(frame)
         self.track_ms.append(_milliseconds_since(started))
 
         started = time.perf_counter()
-        diagnostics = self.tracker.diagnostics if isinstance(self.tracker, Diagnosable) else Diagnostics()
+        diagnostics = getattr(self.tracker, "diagnostics", None) or Diagnostics()
         tracks = _copied(tracks)
         self.tracks.append(tracks)
         _digest(self.digest, tracks)
         if diagnostics.traces is not None:
             traces = _copied(diagnostics.traces)
             _digest(self.digest, traces)
-            self.traces.add(
-                observation.tick, traces, bridge.votes(traces, observation.ids, observation.truth)
-            )
+            if observation is not None:
+                votes = bridge.votes(traces, observation.ids, observation.truth)
+                self.traces.add(frame.tick, traces, votes)
         self.log_ms.append(_milliseconds_since(started))
         return tracks, diagnostics
 

@@ -1,0 +1,243 @@
+"""Runs: a scenario over seeds with several trackers, in one process or many, as one JSON document."""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import os
+import resource
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from scenarios.errors import InputError
+from scenarios.log import EpisodeLog, save
+from scenarios.loop import run_episode
+from scenarios.output import write_json
+from scenarios.spec import Scenario
+from tracker.base import Tracker
+from tracker.registry import make
+from tracker.types import Diagnostics, Tracks
+
+if TYPE_CHECKING:
+    from scenarios.report.recorder import Recorder
+    from sim.simulation import Observation
+
+Document = dict[str, Any]
+Progress = Callable[[int], None]
+"""Is told how many more frames are done."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """What to run.
+
+    Attributes:
+        scenario: What is driven.
+        seeds: Which of its drives.
+        trackers: Names, each once.
+        boxes: Which truth is scored.
+        odometry: Whether the trackers get the car's noisy odometry.
+        jobs: Processes.
+    """
+
+    scenario: Scenario
+    seeds: range
+    trackers: tuple[str, ...]
+    boxes: Literal["amodal", "visible"] = "amodal"
+    odometry: bool = False
+    jobs: int = 1
+
+    @property
+    def frames(self) -> int:
+        """Frames to be rendered."""
+        return len(self.seeds) * self.scenario.frames
+
+    def folder(self, directory: Path, seed: int, tracker: str) -> Path:
+        """Return where one episode of one tracker is kept: a folder of its own where there are several."""
+        if len(self.seeds) > 1:
+            directory /= f"seed-{seed}"
+        if len(self.trackers) > 1:
+            directory /= tracker.replace(":", "-").replace("/", "-")
+        return directory
+
+
+def make_tracker(name: str) -> Tracker:
+    """Build a tracker by its name.
+
+    Raises:
+        InputError: If there is none, or it cannot be built.
+    """
+    try:
+        return make(name)
+    except ValueError as error:
+        raise InputError(" ".join(str(error).split())) from error
+
+
+def execute(run: Run, directory: Path | None = None, progress: Progress | None = None) -> Document:
+    """Run everything and return the document that ``--json`` prints.
+
+    Args:
+        run: What to run. The scores do not depend on its ``jobs``.
+        directory: Where to write what is kept of the episodes; None keeps nothing.
+        progress: Called now and then, in this process.
+
+    Raises:
+        InputError: If there is no such tracker.
+        RenderUnavailableError: If there is no off-screen OpenGL here.
+    """
+    from scenarios.score.statistics import paired
+
+    for name in run.trackers:
+        make_tracker(name)
+    by_seed = dict(_episodes(run, directory, progress))
+    episodes = {name: [by_seed[seed][name] for seed in run.seeds] for name in run.trackers}
+    runs = [_joined(documents) for documents in episodes.values()]
+    document = runs[0]
+    if len(runs) > 1:
+        scores = {name: [episode["scores"] for episode in found] for name, found in episodes.items()}
+        document = {"runs": runs, "paired": paired(scores)}
+    if directory is not None:
+        write_json(directory / "scores.json", document)
+    return document
+
+
+def run_seed(
+    run: Run, seed: int, directory: Path | None, progress: Progress | None = None
+) -> dict[str, Document]:
+    """Run one episode, write what is kept of it, and return the document of each tracker by its name."""
+    from scenarios.score.summary import score
+
+    trackers = {name: make_tracker(name) for name in run.trackers}
+    documents = {}
+    with ExitStack() as stack:
+        recorders = {}
+        if directory is not None:
+            for name in trackers:
+                recorder = _recorder(run, seed, name, run.folder(directory, seed, name))
+                recorders[name] = stack.enter_context(recorder)
+
+        def on_frame(observation: Observation, shown: Mapping[str, tuple[Tracks, Diagnostics]]) -> None:
+            for name, recorder in recorders.items():
+                tracks, diagnostics = shown[name]
+                recorder.frame(observation.image, tracks, diagnostics, observation.truth)
+            if progress is not None:
+                progress(1)
+
+        logs = run_episode(run.scenario, seed, trackers, odometry=run.odometry, on_frame=on_frame)
+        for log in logs:
+            scores, difficulty = score(log, boxes=run.boxes)
+            documents[log.tracker] = _document(run, log, scores, difficulty)
+            if directory is not None:
+                _keep(run, log, documents[log.tracker], recorders[log.tracker])
+    return documents
+
+
+def _recorder(run: Run, seed: int, tracker: str, folder: Path) -> Recorder:
+    from scenarios.report.recorder import Recorder  # plots and video: only where a report is wanted
+
+    camera = run.scenario.in_car.camera
+    title = f"{run.scenario.name}, seed {seed}: {tracker}"
+    return Recorder(folder, width=camera.width, height=camera.height, rate=run.scenario.rate, title=title)
+
+
+def _keep(run: Run, log: EpisodeLog, document: Document, recorder: Recorder) -> None:
+    from scenarios.export import mot
+
+    folder = recorder.directory
+    save(log, folder / "log.npz")
+    mot.write(log.tracks, folder / "tracks.txt")
+    write_json(folder / "scores.json", document)
+    recorder.finish(log, document, run.scenario.model_dump(mode="json"))
+
+
+def _document(run: Run, log: EpisodeLog, scores: Document, difficulty: Document) -> Document:
+    timing = {stage: float(np.mean(ms)) for stage, ms in log.timing_ms.items()}
+    return {
+        "scenario": log.scenario,
+        "spec_id": log.spec_id,
+        "seeds": [log.seed],
+        "tracker": log.tracker,
+        "boxes": run.boxes,
+        "odometry": run.odometry,
+        "frames": len(log.tracks),
+        "scores": scores,
+        "difficulty": difficulty,
+        "hashes": log.hashes,
+        "timing_ms": timing,
+        "fps": 1e3 / sum(timing.values()),
+        "peak_rss_mb": peak_rss_mb(),
+    }
+
+
+def peak_rss_mb() -> float:
+    """Return the most memory that this process has held so far, megabytes."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1 << 20 if sys.platform == "darwin" else 1 << 10)
+
+
+def _joined(documents: list[Document]) -> Document:
+    """Join one tracker's documents over seeds; one alone stays as it is."""
+    from scenarios.score.statistics import over_seeds
+
+    first = documents[0]
+    if len(documents) == 1:
+        return first
+    frames = np.array([d["frames"] for d in documents], float)
+    return first | {
+        "seeds": [seed for d in documents for seed in d["seeds"]],
+        "frames": int(frames.sum()),
+        "scores": over_seeds([d["scores"] for d in documents]),
+        "difficulty": over_seeds([d["difficulty"] for d in documents]),
+        # In the order of the seeds, whichever process was ready first.
+        "hashes": {
+            name: hashlib.sha256("".join(d["hashes"][name] for d in documents).encode()).hexdigest()
+            for name in first["hashes"]
+        },
+        "timing_ms": {
+            stage: float(np.average([d["timing_ms"][stage] for d in documents], weights=frames))
+            for stage in first["timing_ms"]
+        },
+        "fps": float(frames.sum() / sum(d["frames"] / d["fps"] for d in documents)),
+        "peak_rss_mb": max(d["peak_rss_mb"] for d in documents),
+    }
+
+
+def _episodes(
+    run: Run, directory: Path | None, progress: Progress | None
+) -> Iterator[tuple[int, dict[str, Document]]]:
+    """Yield each seed's documents, in the order in which they are ready."""
+    jobs = min(run.jobs, len(run.seeds))
+    if jobs == 1:
+        for seed in run.seeds:
+            yield seed, run_seed(run, seed, directory, progress)
+        return
+    # The workers share the cores: each draws on one thread. Mesa reads this when its first context is made,
+    # and spawned processes inherit it before they import anything.
+    os.environ["LP_NUM_THREADS"] = "1"
+    spawn = multiprocessing.get_context("spawn")  # a forked process would hang in GL
+    with ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_quiet_interrupt) as pool:
+        try:
+            futures = {pool.submit(run_seed, run, seed, directory): seed for seed in run.seeds}
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+                if progress is not None:
+                    progress(run.scenario.frames)
+        except BaseException:
+            # Whoever waits for the pool would wait for whole episodes.
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise
+
+
+def _quiet_interrupt() -> None:
+    """Let an interrupt end a worker without a word: the parent is interrupted too, and speaks for all."""
+    signal.signal(signal.SIGINT, lambda _number, _frame: os._exit(130))
