@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sim.camera import Camera, Pose
 from sim.models import Surface
+from sim.render.antialias import smooth_edges
 from sim.render.context import check, context
 from sim.render.ground import MARGIN, cut, grain_texture, road_texture
 from sim.render.instances import COMMAND, INSTANCE, Library, in_bands
@@ -19,7 +20,6 @@ from sim.render.types import Picture, Silhouettes, Stage
 from sim.textures import texture_array
 from sim.world import Bodies, WorldState
 
-_SAMPLES = 4
 _ROOM = 8192  # instances and draws in a frame
 
 _LINE_WIDTH = 0.15
@@ -41,8 +41,9 @@ _GLOSS = {  # share of the body's colour (2: by the texture's alpha), least refl
 class GlRenderer:
     """Draws the world of one stage.
 
-    A frame is two passes over the same geometry: identity and depth with one sample at the pixel's centre, and colour
-    with four samples and textures. Shadows are a mask that only the ground's colour reads.
+    A frame is one pass over the geometry, with one sample at each pixel's centre, that writes colour, identity and
+    depth. Shadows are a mask that only the ground's colour reads, the sky and the glare of lamps are colour alone, and
+    the stairs along edges are smoothed afterwards.
 
     Args:
         stage: What stands still.
@@ -91,7 +92,7 @@ class GlRenderer:
             RenderError: If OpenGL reports an error.
         """
         bodies = Bodies.concatenate(self._stage.scenery, state.vehicles)
-        selection = in_bands(self._library, bodies, self._library.select(bodies, camera, pose), pose)
+        selection = in_bands(bodies, self._library.select(bodies, camera, pose), pose)
         instances = self._library.instances(bodies, selection, pose)
         commands = self._library.commands(selection.meshes)
         stretches = self._ground.select(camera, pose)
@@ -102,26 +103,12 @@ class GlRenderer:
             self._stretches.write(self._ground.stretches(stretches, pose))
             self._ground_commands.write(self._ground.commands(stretches))
             draws = (len(commands), len(stretches))
-            ids, depth = self._truth_pass(ctx, view, draws)
             self._shadow_pass(ctx, view, draws, pose)
-            colour = self._colour_pass(ctx, view, draws, camera, pose)
+            self._main_pass(ctx, view, draws)
+            self._sky_pass(ctx, camera, pose)
+            rgba, ids, depth = self._read()
             check(ctx, "rendering")
-        return Picture(colour=colour, ids=ids, depth=depth)
-
-    def _truth_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int]) -> tuple[Any, Any]:
-        width, height = self._size
-        self._truth.use()
-        ctx.enable_only(ctx.DEPTH_TEST | ctx.CULL_FACE)
-        ctx.front_face = "cw"
-        self._truth.clear()
-        for shader in (self._body_truth, self._ground_truth):
-            set_uniforms(shader, **view)
-        self._body_truth_array.render_indirect(self._commands, count=draws[0])
-        self._ground_truth_array.render_indirect(self._ground_commands, count=draws[1])
-        ids = np.frombuffer(self._truth.read(components=1, attachment=0, dtype="u4"), np.uint32)
-        depth = np.frombuffer(self._truth.read(components=1, attachment=1, dtype="f4"), np.float32)
-        depth = np.where(ids == 0, np.float32(np.inf), depth)
-        return ids.reshape(height, width), depth.reshape(height, width)
+        return Picture(colour=smooth_edges(rgba), ids=ids, depth=depth)
 
     def _shadow_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int], pose: Pose) -> None:
         self._mask.use()
@@ -133,22 +120,24 @@ class GlRenderer:
         set_uniforms(self._body_shadow, **view, u_sun=tuple(sun), u_ground=-float(pose.position[2]))
         self._body_shadow_array.render_indirect(self._commands, count=draws[0])
 
-    def _colour_pass(
-        self, ctx: Any, view: dict[str, Any], draws: tuple[int, int], camera: Camera, pose: Pose
-    ) -> NDArray[np.uint8]:
-        width, height = self._size
-        self._colour.use()
+    def _main_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int]) -> None:
+        self._target.use()
         ctx.enable_only(ctx.DEPTH_TEST | ctx.CULL_FACE)
-        self._colour.clear()
-        for shader in (self._body_colour, self._ground_colour):
+        ctx.front_face = "cw"
+        self._target.clear()
+        for shader in (self._body, self._terrain):
             set_uniforms(shader, **view)
         self._texture_array.use(0)
         self._grain.use(1)
         self._road.use(2)
         self._mask_texture.use(3)
-        self._panorama.use(4)
-        self._body_colour_array.render_indirect(self._commands, count=draws[0])
-        self._ground_colour_array.render_indirect(self._ground_commands, count=draws[1])
+        self._body_array.render_indirect(self._commands, count=draws[0])
+        self._terrain_array.render_indirect(self._ground_commands, count=draws[1])
+
+    def _sky_pass(self, ctx: Any, camera: Camera, pose: Pose) -> None:
+        width, height = self._size
+        self._over.use()
+        ctx.enable_only(ctx.DEPTH_TEST)
         ctx.depth_func = "<="
         right, down, ahead = pose.rotation
         look = np.stack(
@@ -160,12 +149,18 @@ class GlRenderer:
                 + down * ((0.5 * height - camera.cy) / camera.focal),
             ]
         )
-        self._sky["u_look"].write(look.astype("<f4").tobytes())
+        self._panorama.use(4)
+        set_uniforms(self._sky, u_look=look.astype("<f4").tobytes())
         self._sky_array.render(vertices=3)
         ctx.depth_func = "<"
-        ctx.copy_framebuffer(self._resolved, self._colour)
-        rgba = np.frombuffer(self._resolved.read(components=4), np.uint8).reshape(height, width, 4)
-        return np.ascontiguousarray(rgba[..., :3])
+
+    def _read(self) -> tuple[NDArray[np.uint8], NDArray[np.uint32], NDArray[np.float32]]:
+        width, height = self._size
+        ids = np.frombuffer(self._target.read(components=1, attachment=1, dtype="u4"), np.uint32)
+        depth = np.frombuffer(self._target.read(components=1, attachment=2, dtype="f4"), np.float32)
+        depth = np.where(ids == 0, np.float32(np.inf), depth)
+        rgba = np.frombuffer(self._target.read(components=4), np.uint8)
+        return rgba.reshape(height, width, 4), ids.reshape(height, width), depth.reshape(height, width)
 
     def silhouettes(self, state: WorldState, camera: Camera, pose: Pose) -> Silhouettes:
         """Draw each vehicle alone, as the identity pass draws it."""
@@ -189,19 +184,13 @@ class GlRenderer:
 
     def _make_targets(self, ctx: Any) -> None:
         keep, size = self._keep, self._size
-        self._truth = keep(
-            ctx.framebuffer(
-                [keep(ctx.renderbuffer(size, 1, dtype="u4")), keep(ctx.renderbuffer(size, 1, dtype="f4"))],
-                keep(ctx.depth_renderbuffer(size)),
-            )
+        colour, depth = keep(ctx.renderbuffer(size, 4)), keep(ctx.depth_renderbuffer(size))
+        ids, distances = (
+            keep(ctx.renderbuffer(size, 1, dtype="u4")),
+            keep(ctx.renderbuffer(size, 1, dtype="f4")),
         )
-        self._colour = keep(
-            ctx.framebuffer(
-                [keep(ctx.renderbuffer(size, 4, samples=_SAMPLES))],
-                keep(ctx.depth_renderbuffer(size, samples=_SAMPLES)),
-            )
-        )
-        self._resolved = keep(ctx.framebuffer([keep(ctx.renderbuffer(size, 4))]))
+        self._target = keep(ctx.framebuffer([colour, ids, distances], depth))
+        self._over = keep(ctx.framebuffer([colour], depth))
         self._mask_texture = keep(ctx.texture(size, 1))
         self._mask_texture.repeat_x = self._mask_texture.repeat_y = False
         self._mask = keep(ctx.framebuffer([self._mask_texture]))
@@ -228,33 +217,31 @@ class GlRenderer:
 
     def _make_programs(self, ctx: Any) -> None:
         keep, stage, light = self._keep, self._stage, self._stage.light
-        self._body_truth = keep(program(ctx, "body", "truth", "TRUTH"))
-        self._body_truth_array = self._bodies(ctx, self._body_truth, "3f 24x", "3f 2f 3f 4x 1u/i", "i_id")
         self._body_shadow = keep(program(ctx, "body", "mask", "SHADOW"))
         self._body_shadow_array = self._bodies(ctx, self._body_shadow, "3f 24x", "3f 2f 3f 8x/i")
-        self._body_colour = keep(program(ctx, "body", "body", "COLOUR", shared=("light",)))
-        self._body_colour_array = keep(
+        self._body = keep(program(ctx, "body", "body", "COLOUR", shared=("light",)))
+        self._body_array = keep(
             ctx.vertex_array(
-                self._body_colour,
+                self._body,
                 [
                     (self._vertices, "3f 3f 2f 1f", "in_position", "in_normal", "in_uv", "in_surface"),
-                    (self._instances, "3f 2f 3f 4f1 4x/i", "i_position", "i_turn", "i_scale", "i_colour"),
+                    (
+                        self._instances,
+                        "3f 2f 3f 4f1 1u/i",
+                        "i_position",
+                        "i_turn",
+                        "i_scale",
+                        "i_colour",
+                        "i_id",
+                    ),
                 ],
                 self._faces,
             )
         )
-        self._ground_truth = keep(program(ctx, "ground", "truth", "TRUTH"))
-        self._ground_truth_array = keep(
+        self._terrain = keep(program(ctx, "ground", "ground", shared=("light",)))
+        self._terrain_array = keep(
             ctx.vertex_array(
-                self._ground_truth,
-                [(self._ground_vertices, "3f 8x", "in_position"), (self._stretches, "3f 4x/i", "i_offset")],
-                self._ground_faces,
-            )
-        )
-        self._ground_colour = keep(program(ctx, "ground", "ground", shared=("light",)))
-        self._ground_colour_array = keep(
-            ctx.vertex_array(
-                self._ground_colour,
+                self._terrain,
                 [
                     (self._ground_vertices, "3f 2f", "in_position", "in_road"),
                     (self._stretches, "3f 1f/i", "i_offset", "i_arc"),
@@ -271,15 +258,15 @@ class GlRenderer:
             "u_horizon": tuple(light.horizon),
             "u_haze": light.haze,
         }
-        for shader in (self._body_colour, self._ground_colour, self._sky):
+        for shader in (self._body, self._terrain, self._sky):
             set_uniforms(shader, **lit, u_textures=0, u_grain=1, u_road=2, u_shadow=3, u_panorama=4)
         table = np.zeros((len(Surface), 4), "<f4")
         for surface, row in _GLOSS.items():
             table[surface] = row
-        set_uniforms(self._body_colour, u_material=table.tobytes())
+        set_uniforms(self._body, u_material=table.tobytes())
         lines = line_table(stage.ground.lane_edges, stage.ground.line_styles)
         set_uniforms(
-            self._ground_colour,
+            self._terrain,
             u_line=np.vstack([lines, np.zeros((24 - len(lines), 3))]).astype("<f4").tobytes(),
             u_lines=len(lines),
             u_paved=stage.ground.paved,

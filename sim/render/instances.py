@@ -156,7 +156,7 @@ class Library:
         return out
 
 
-def in_bands(library: Library, bodies: Bodies, selection: Selection, pose: Pose) -> Selection:
+def in_bands(bodies: Bodies, selection: Selection, pose: Pose) -> Selection:
     """Reorder by mesh within bands of distance: few draws, and still near before far."""
     offset = bodies.positions[selection.rows] - pose.position
     distance = np.maximum(np.sqrt((offset * offset).sum(axis=1)), 1.0)

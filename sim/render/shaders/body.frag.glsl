@@ -7,7 +7,11 @@ in vec3 v_normal;
 in vec3 v_uv;
 flat in vec4 v_colour;
 in float v_height;
-out vec4 o_colour;
+flat in uint v_id;
+in float v_depth;
+layout(location = 0) out vec4 o_colour;
+layout(location = 1) out uint o_id;
+layout(location = 2) out float o_depth;
 
 void main() {
     int surface = int(v_uv.z + 0.5);
@@ -34,4 +38,6 @@ void main() {
     float glint = pow(max(dot(mirror, u_sun), 0.0), 90.0) * min(8.0 * gloss, 1.0);
     vec3 colour = mix(albedo * light, world, reflection) + glint * u_sun_colour;
     o_colour = vec4(film(hazed(colour, distance)), 1.0);
+    o_id = v_id;
+    o_depth = v_depth;
 }

@@ -10,16 +10,12 @@ vec3 turned(vec3 v) {
     return vec3(i_turn.x * v.x - i_turn.y * v.y, i_turn.y * v.x + i_turn.x * v.y, v.z);
 }
 
-#ifdef TRUTH
+#ifdef ALONE
 in uint i_id;
-uniform vec3 u_forward;
 flat out uint v_id;
-out float v_depth;
 
 void main() {
-    vec3 at = i_position + turned(in_position * i_scale);
-    gl_Position = u_clip * vec4(at, 1.0);
-    v_depth = dot(u_forward, at);
+    gl_Position = u_clip * vec4(i_position + turned(in_position * i_scale), 1.0);
     v_id = i_id;
 }
 #endif
@@ -41,11 +37,15 @@ in vec3 in_normal;
 in vec2 in_uv;
 in float in_surface;
 in vec4 i_colour;
+in uint i_id;
+uniform vec3 u_forward;
 out vec3 v_at;
 out vec3 v_normal;
 out vec3 v_uv;
 flat out vec4 v_colour;
 out float v_height;
+flat out uint v_id;
+out float v_depth;
 
 void main() {
     vec3 local = in_position * i_scale;
@@ -54,6 +54,8 @@ void main() {
     v_uv = vec3(in_uv, in_surface);
     v_colour = i_colour;
     v_height = local.z;
+    v_id = i_id;
+    v_depth = dot(u_forward, v_at);
     gl_Position = u_clip * vec4(v_at, 1.0);
 }
 #endif

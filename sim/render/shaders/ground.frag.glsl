@@ -10,7 +10,10 @@ uniform int u_lines;
 uniform vec3 u_line[LINES];  // offset, half width (negative: dashed), yellow
 in vec3 v_at;
 in vec2 v_road;
-out vec4 o_colour;
+uniform vec3 u_forward;
+layout(location = 0) out vec4 o_colour;
+layout(location = 1) out uint o_id;
+layout(location = 2) out float o_depth;
 
 void main() {
     float s = v_road.x, d = v_road.y;
@@ -53,4 +56,6 @@ void main() {
     float shadow = 1.0 - texture(u_shadow, pixel).r;
     vec3 light = u_sun_colour * max(u_sun.z, 0.0) * shadow + 0.8 * u_zenith + 0.35 * u_horizon;
     o_colour = vec4(film(hazed(albedo * light, distance)), 1.0);
+    o_id = 1u;
+    o_depth = dot(u_forward, v_at);
 }

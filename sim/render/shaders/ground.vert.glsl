@@ -6,23 +6,12 @@ in float i_arc;
 uniform mat4 u_clip;
 invariant gl_Position;
 
-#ifdef TRUTH
-uniform vec3 u_forward;
-flat out uint v_id;
-out float v_depth;
-#else
 out vec3 v_at;
 out vec2 v_road;
-#endif
 
 void main() {
     vec3 at = in_position + i_offset;
     gl_Position = u_clip * vec4(at, 1.0);
-#ifdef TRUTH
-    v_depth = dot(u_forward, at);
-    v_id = 1u;
-#else
     v_at = at;
     v_road = vec2(in_road.x + i_arc, in_road.y);
-#endif
 }
