@@ -42,7 +42,9 @@ def make_light(params: LightParams, seed: int) -> Light:
     azimuth = rng.uniform(-np.pi, np.pi)
     warmth = rng.uniform(0.9, 1.1)
     clouds = int(rng.integers(1 << 31))
-    sun = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    sun = np.array(
+        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    )
     cloud = max(params.cloud, min(1.0, 1.5 * params.rain))
     if params.time == "night":
         sun_colour, zenith, horizon = _MOON * (1 - 0.8 * cloud), _NIGHT_ZENITH, _NIGHT_HORIZON * (1 + cloud)
@@ -50,7 +52,13 @@ def make_light(params: LightParams, seed: int) -> Light:
         height = np.sin(elevation)
         # Longer ways through the air take the blue out of the sun's light.
         colour = _mix(_SUN_LOW, _SUN_HIGH, min(1.0, height / 0.75))
-        sun_colour = 2.6 * colour * (0.72 + 0.28 * height) * (1 - 0.35 * cloud) * (1 - 0.97 * max(0.0, cloud - 0.7) / 0.3)
+        sun_colour = (
+            2.6
+            * colour
+            * (0.72 + 0.28 * height)
+            * (1 - 0.35 * cloud)
+            * (1 - 0.97 * max(0.0, cloud - 0.7) / 0.3)
+        )
         zenith = _mix(_mix(_CLEAR_ZENITH, _OVERCAST_ZENITH, cloud**2), _RAIN_ZENITH, params.rain) * warmth
         horizon = _mix(_mix(_CLEAR_HORIZON, _OVERCAST_HORIZON, cloud**2), _RAIN_HORIZON, params.rain)
     return Light(

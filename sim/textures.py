@@ -192,7 +192,9 @@ def _foliage(rng: np.random.Generator) -> Floats:
 
 def _bark(rng: np.random.Generator) -> Floats:
     grain = _fbm(rng, 32, 3, 0.7, stretch=8)
-    return _layer(_tint((0.13, 0.10, 0.075), (0.45, 0.38, 0.30), 0.5 + 0.28 * grain + 0.1 * _fbm(rng, 4, 3)), 0.05)
+    return _layer(
+        _tint((0.13, 0.10, 0.075), (0.45, 0.38, 0.30), 0.5 + 0.28 * grain + 0.1 * _fbm(rng, 4, 3)), 0.05
+    )
 
 
 def _concrete(rng: np.random.Generator) -> Floats:
@@ -237,7 +239,9 @@ def _roof(rng: np.random.Generator) -> Floats:
     course = np.floor(row * 16)
     tile = (column * 16 + 0.5 * (course % 2)) % 1
     step = (row * 16) % 1
-    shade = 0.5 + 0.12 * _fbm(rng, 16, 2) + 0.10 * _fbm(rng, 3, 3) - 0.25 * (step > 0.85) - 0.12 * (tile < 0.10)
+    shade = (
+        0.5 + 0.12 * _fbm(rng, 16, 2) + 0.10 * _fbm(rng, 3, 3) - 0.25 * (step > 0.85) - 0.12 * (tile < 0.10)
+    )
     return _layer(_tint((0.17, 0.09, 0.07), (0.55, 0.31, 0.23), shade), 0.05)
 
 
@@ -275,7 +279,9 @@ def _sign(rng: np.random.Generator) -> Floats:
             place, stop = -0.74, rng.uniform(0.2, 0.75)
             while place < stop:
                 width = rng.uniform(0.05, 0.10)
-                letter = (across > place) & (across < place + width) & (down > top) & (down < top + 0.55 * pitch)
+                letter = (
+                    (across > place) & (across < place + width) & (down > top) & (down < top + 0.55 * pitch)
+                )
                 hole = (np.abs(across - place - width / 2) < 0.2 * width) & (
                     np.abs(down - top - 0.28 * pitch) < rng.uniform(0.06, 0.16) * pitch
                 )

@@ -62,12 +62,19 @@ class MeshBuilder:
         ring = np.roll(corners, -1, axis=0)
         normal = np.cross(corners - corners[0], ring - corners[0]).sum(axis=0)
         flip = facing is not None and float(normal @ np.asarray(facing, float)) < 0
-        flat = planar_uv(corners, -normal if flip else normal, surface) if uv is None else np.asarray(uv, float)
+        flat = (
+            planar_uv(corners, -normal if flip else normal, surface) if uv is None else np.asarray(uv, float)
+        )
         shading = None if normals is None else np.asarray(normals, float)
         order = np.arange(len(corners))[::-1] if flip else np.arange(len(corners))
         for i in range(1, len(order) - 1):
             pick = order[[0, i, i + 1]]
-            if np.linalg.norm(np.cross(corners[pick[1]] - corners[pick[0]], corners[pick[2]] - corners[pick[0]])) < 1e-7:
+            if (
+                np.linalg.norm(
+                    np.cross(corners[pick[1]] - corners[pick[0]], corners[pick[2]] - corners[pick[0]])
+                )
+                < 1e-7
+            ):
                 continue
             self._triangles.append(corners[pick])
             self._uvs.append(flat[pick])

@@ -138,8 +138,11 @@ def _body(builder: MeshBuilder, shape: CarShape, detail: int) -> Floats:
     for i, (along, share) in enumerate(stations):
         blend = along / shape.length
         end = np.exp(-along / 0.12)
-        points[i, :, 0] = rear + along + tuck * end - 0.06 * (1 - np.exp(-max(along - shape.length + 0.2, 0))) * (
-            levels > 0.6
+        points[i, :, 0] = (
+            rear
+            + along
+            + tuck * end
+            - 0.06 * (1 - np.exp(-max(along - shape.length + 0.2, 0))) * (levels > 0.6)
         )
         points[i, :, 1] = half * share * bulge
         # The nose is lower than the tail; between the axles the belt runs nearly level.
@@ -241,7 +244,9 @@ def _windows(builder: MeshBuilder, left: Floats, detail: int) -> None:
         lamp = np.array([at(0, 0.17, 0.90), at(0, -0.17, 0.90), at(0, -0.17, 0.96), at(0, 0.17, 0.96)])
         lamp[:, 0] -= 0.02
         facing = np.array([-1.0, 0.0, 0.4])
-        builder.polygon(lamp, Surface.TAIL_LAMP, facing=facing, uv=[(2.0, 0.4), (2.2, 0.4), (2.2, 0.6), (2.0, 0.6)])
+        builder.polygon(
+            lamp, Surface.TAIL_LAMP, facing=facing, uv=[(2.0, 0.4), (2.2, 0.4), (2.2, 0.6), (2.0, 0.6)]
+        )
         # Seals round the rear window: a thin dark frame between glass and paint.
         for low, high, inner, outer in ((0.05, 0.10, 0.84, 0.84), (0.97, 1.0, 0.84, 0.84)):
             strip = [at(0, outer, low), at(0, -outer, low), at(0, -inner, high), at(0, inner, high)]
@@ -250,7 +255,11 @@ def _windows(builder: MeshBuilder, left: Floats, detail: int) -> None:
         for side in (1.0, -1.0):
             centre = mirror_foot * mirror if side < 0 else mirror_foot
             y = sorted((centre[1] + side * 0.02, centre[1] + side * 0.20))
-            builder.box((centre[0] - 0.06, y[0], centre[2] - 0.01), (centre[0] + 0.06, y[1], centre[2] + 0.13), Surface.PAINT)
+            builder.box(
+                (centre[0] - 0.06, y[0], centre[2] - 0.01),
+                (centre[0] + 0.06, y[1], centre[2] + 0.13),
+                Surface.PAINT,
+            )
 
 
 def _rear(builder: MeshBuilder, shape: CarShape, detail: int, body: Floats) -> None:
@@ -304,7 +313,9 @@ def _rear(builder: MeshBuilder, shape: CarShape, detail: int, body: Floats) -> N
         )  # fmt: skip
     builder.box((rear + 0.03, 0.42, 0.20), (rear + 0.20, 0.52, 0.27), Surface.CHROME, without="+x")
     # Dark underside: axle and tank, seen between the rear wheels.
-    builder.box((rear + 0.45, -half * 0.70, 0.15), (rear + 1.1, half * 0.70, 0.30), Surface.PLASTIC, without="+z")
+    builder.box(
+        (rear + 0.45, -half * 0.70, 0.15), (rear + 1.1, half * 0.70, 0.30), Surface.PLASTIC, without="+z"
+    )
 
 
 def _front(builder: MeshBuilder, shape: CarShape, detail: int, body: Floats) -> None:
@@ -379,5 +390,8 @@ def _side_lines(builder: MeshBuilder, shape: CarShape) -> None:
     for side in (1.0, -1.0):
         for x in (-0.62, 0.42):
             line = [(x - 0.008, side * half, 0.40), (x + 0.008, side * half, 0.40)]
-            line += [(x + 0.008, side * half * 0.955, shape.deck - 0.06), (x - 0.008, side * half * 0.955, shape.deck - 0.06)]
+            line += [
+                (x + 0.008, side * half * 0.955, shape.deck - 0.06),
+                (x - 0.008, side * half * 0.955, shape.deck - 0.06),
+            ]
             builder.decal(line, Surface.PLASTIC, facing=(0, side, 0), lift=0.006)

@@ -78,14 +78,26 @@ def sweep(
 
 
 def _patch(
-    builder: MeshBuilder, x: float, y: tuple[float, float], z: tuple[float, float], surface: Surface, lift: float = 0.012
+    builder: MeshBuilder,
+    x: float,
+    y: tuple[float, float],
+    z: tuple[float, float],
+    surface: Surface,
+    lift: float = 0.012,
 ) -> None:
     """Add an upright patch that looks back."""
-    builder.decal([(x, y[1], z[0]), (x, y[0], z[0]), (x, y[0], z[1]), (x, y[1], z[1])], surface, facing=BACK, lift=lift)
+    builder.decal(
+        [(x, y[1], z[0]), (x, y[0], z[0]), (x, y[0], z[1]), (x, y[1], z[1])], surface, facing=BACK, lift=lift
+    )
 
 
 def _front_patch(
-    builder: MeshBuilder, x: float, y: tuple[float, float], z: tuple[float, float], surface: Surface, lift: float = 0.012
+    builder: MeshBuilder,
+    x: float,
+    y: tuple[float, float],
+    z: tuple[float, float],
+    surface: Surface,
+    lift: float = 0.012,
 ) -> None:
     """Add an upright patch that looks ahead."""
     corners = [(x, y[0], z[0]), (x, y[1], z[0]), (x, y[1], z[1]), (x, y[0], z[1])]
@@ -93,7 +105,11 @@ def _front_patch(
 
 
 def _pane(
-    builder: MeshBuilder, y: float, x: tuple[float, float], z: tuple[float, float], surface: Surface = Surface.GLASS
+    builder: MeshBuilder,
+    y: float,
+    x: tuple[float, float],
+    z: tuple[float, float],
+    surface: Surface = Surface.GLASS,
 ) -> None:
     """Add a patch on a flank at ``y``."""
     corners = [(x[0], y, z[0]), (x[1], y, z[0]), (x[1], y, z[1]), (x[0], y, z[1])]
@@ -122,7 +138,12 @@ def _tyres(
 
 
 def _lamps(
-    builder: MeshBuilder, rear: float, half: float, y: tuple[float, float], z: tuple[float, float], lift: float = 0.02
+    builder: MeshBuilder,
+    rear: float,
+    half: float,
+    y: tuple[float, float],
+    z: tuple[float, float],
+    lift: float = 0.02,
 ) -> None:
     """Add tail lamps on both sides between shares ``y`` of the half width."""
     _patch(builder, rear, (half * y[0], half * y[1]), z, Surface.TAIL_LAMP, lift)
@@ -159,7 +180,14 @@ def _van(builder: MeshBuilder, size: tuple[float, float, float], detail: int) ->
     _patch(builder, rear, (-0.26, 0.26), (0.60, 0.71), Surface.PLATE, 0.02)
     _tyres(builder, (rear + 0.95, front - 0.90), half, 0.33, 0.22, detail)
     if detail:
-        _front_patch(builder, front - 0.05, (-half * 0.5, half * 0.5), (hood - 0.45, hood - 0.25), Surface.PLASTIC, 0.03)
+        _front_patch(
+            builder,
+            front - 0.05,
+            (-half * 0.5, half * 0.5),
+            (hood - 0.45, hood - 0.25),
+            Surface.PLASTIC,
+            0.03,
+        )
         _patch(builder, rear + 0.03, (-0.012, 0.012), (0.52, height - 0.15), Surface.PLASTIC, 0.02)
     if detail == 2:
         _patch(builder, rear + 0.04, (-0.15, 0.15), (height - 0.14, height - 0.11), Surface.PLASTIC, 0.02)
@@ -170,7 +198,9 @@ def _van(builder: MeshBuilder, size: tuple[float, float, float], detail: int) ->
             _pane(builder, side * half, (rear + 0.3, front - 2.0), (0.62, 0.66), Surface.PLASTIC)
 
 
-def _rear_doors(builder: MeshBuilder, rear: float, half: float, floor: float, height: float, detail: int) -> None:
+def _rear_doors(
+    builder: MeshBuilder, rear: float, half: float, floor: float, height: float, detail: int
+) -> None:
     """Add the two doors' gap, frame and locking bars."""
     _patch(builder, rear, (-0.02, 0.02), (floor + 0.05, height - 0.10), Surface.PLASTIC)
     if detail == 0:
@@ -181,14 +211,19 @@ def _rear_doors(builder: MeshBuilder, rear: float, half: float, floor: float, he
         _patch(builder, rear, (y, y + half * 0.06), (floor + 0.05, height - 0.1), Surface.STEEL, 0.010)
     if detail == 2:
         for y in (-0.62, -0.28, 0.28, 0.62):
-            _patch(builder, rear, (y * half - 0.018, y * half + 0.018), (floor + 0.1, height - 0.15), Surface.STEEL, 0.03)
+            _patch(
+                builder,
+                rear,
+                (y * half - 0.018, y * half + 0.018),
+                (floor + 0.1, height - 0.15),
+                Surface.STEEL,
+                0.03,
+            )
         for y in (-half * 0.45, half * 0.45):
             _patch(builder, rear, (y - 0.14, y + 0.14), (floor + 0.55, floor + 0.60), Surface.STEEL, 0.035)
 
 
-def _chassis(
-    builder: MeshBuilder, rear: float, front: float, half: float, floor: float, detail: int
-) -> None:
+def _chassis(builder: MeshBuilder, rear: float, front: float, half: float, floor: float, detail: int) -> None:
     """Add frame, under-run bar, mudguards, lamps and plate of a lorry."""
     builder.box((rear + 0.3, -half * 0.45, 0.55), (front, half * 0.45, floor), Surface.PLASTIC, without="+z")
     builder.box((rear + 0.05, -half * 0.96, 0.50), (rear + 0.15, half * 0.96, 0.64), Surface.STEEL)
@@ -201,13 +236,21 @@ def _chassis(
             _patch(builder, rear + 0.42, (y[0], y[1]), (0.18, 0.70), Surface.RUBBER, 0.0)
 
 
-def _cab(builder: MeshBuilder, front: float, half: float, top: float, detail: int, length: float = 2.1) -> None:
+def _cab(
+    builder: MeshBuilder, front: float, half: float, top: float, detail: int, length: float = 2.1
+) -> None:
     """Add a lorry's cab."""
     back = front - length
     profile = [(back, 0.45), (front - 0.05, 0.40), (front, 0.75), (front - 0.03, 1.55), (front - 0.28, top - 0.18),
                (front - 0.60, top), (back, top)]  # fmt: skip
     paint = Surface.PAINT
-    sweep(builder, profile, half, [Surface.PLASTIC, Surface.PLASTIC, paint, paint, paint, paint, paint], side=paint)
+    sweep(
+        builder,
+        profile,
+        half,
+        [Surface.PLASTIC, Surface.PLASTIC, paint, paint, paint, paint, paint],
+        side=paint,
+    )
     screen = np.array([(front - 0.06, -half * 0.92, 1.62), (front - 0.06, half * 0.92, 1.62),
                        (front - 0.25, half * 0.88, top - 0.28), (front - 0.25, -half * 0.88, top - 0.28)])  # fmt: skip
     builder.decal(screen, Surface.GLASS, facing=(1, 0, 0.2), lift=0.02)
@@ -242,7 +285,11 @@ def _articulated(builder: MeshBuilder, size: tuple[float, float, float], detail:
     _rear_doors(builder, rear, half, floor, height, detail)
     _chassis(builder, rear, front - 0.5, half, floor, detail)
     _cab(builder, front, half * 0.97, height - 0.25, detail, 2.2)
-    axles = (rear + 2.0, rear + 3.3, rear + 4.6, front - 4.0, front - 1.3) if detail else (rear + 3.0, front - 2.5)
+    axles = (
+        (rear + 2.0, rear + 3.3, rear + 4.6, front - 4.0, front - 1.3)
+        if detail
+        else (rear + 3.0, front - 2.5)
+    )
     _tyres(builder, axles, half * 0.97, 0.50, 0.50, detail)
     if detail == 2:
         for side in (1.0, -1.0):
@@ -283,4 +330,6 @@ def _bus(builder: MeshBuilder, size: tuple[float, float, float], detail: int) ->
             _patch(builder, rear, (-half * 0.55, half * 0.55), (z, z + 0.03), Surface.CHROME, 0.02)
         for side in (1.0, -1.0):
             y = sorted((side * half, side * (half + 0.25)))
-            builder.box((front - 0.05, y[0], height - 1.2), (front + 0.1, y[1], height - 0.6), Surface.PLASTIC)
+            builder.box(
+                (front - 0.05, y[0], height - 1.2), (front + 0.1, y[1], height - 0.6), Surface.PLASTIC
+            )

@@ -71,7 +71,13 @@ def _icosahedron() -> tuple[Floats, Floats]:
 
 
 def clump(
-    builder: MeshBuilder, centre: Floats, radii: Floats, rng: np.random.Generator, *, spikes: int, rough: float = 0.24
+    builder: MeshBuilder,
+    centre: Floats,
+    radii: Floats,
+    rng: np.random.Generator,
+    *,
+    spikes: int,
+    rough: float = 0.24,
 ) -> None:
     """Add a lump of leaves: a dented icosahedron, and twigs that break its outline.
 
@@ -102,7 +108,10 @@ def clump(
         side /= np.linalg.norm(side)
         other = np.cross(out, side)
         tip = centre + out * radii * rng.uniform(1.10, 1.55) + rng.normal(0, 0.12, 3) * radii
-        ring = [centre + radii * (0.72 * out + 0.40 * (np.cos(a) * side + np.sin(a) * other)) for a in (0.0, 2.1, 4.2)]
+        ring = [
+            centre + radii * (0.72 * out + 0.40 * (np.cos(a) * side + np.sin(a) * other))
+            for a in (0.0, 2.1, 4.2)
+        ]
         normal = out + rng.normal(0, 0.35, 3)
         normal /= np.linalg.norm(normal)
         for i in range(3):
@@ -139,7 +148,13 @@ def _broadleaf(name: str, size: tuple[float, float, float], clumps: int, low: fl
     swell = {2: 1.0, 1: 1.35, 0: 1.0}[detail]
     shape = stream(_SEED, "plants", name, "clumps")
     if detail == 0:
-        clump(builder, np.array([0, 0, middle]), np.array([0.44 * width, 0.44 * width, 0.5 * (top - base)]), shape, spikes=4)
+        clump(
+            builder,
+            np.array([0, 0, middle]),
+            np.array([0.44 * width, 0.44 * width, 0.5 * (top - base)]),
+            shape,
+            spikes=4,
+        )
         return scaled_to(builder, size)
     clump(builder, np.array([lean[0], lean[1], middle]), core, shape, spikes=6 if detail == 2 else 2)
     for i in range(keep):
@@ -147,7 +162,9 @@ def _broadleaf(name: str, size: tuple[float, float, float], clumps: int, low: fl
         centre = np.array(
             [spread * np.cos(angles[i]), spread * np.sin(angles[i]), middle + lifts[i] * 0.40 * (top - base)]
         )
-        clump(builder, centre, swell * radii[i] * np.array([1, 1, 0.85]), shape, spikes=4 if detail == 2 else 2)
+        clump(
+            builder, centre, swell * radii[i] * np.array([1, 1, 0.85]), shape, spikes=4 if detail == 2 else 2
+        )
     return scaled_to(builder, size)
 
 
@@ -183,7 +200,9 @@ def _bush(name: str, size: tuple[float, float, float], clumps: int, detail: int)
     count = clumps if detail == 2 else (2 if detail else 1)
     for i in range(count):
         turn = 2 * np.pi * (i + rng.uniform(0, 0.5)) / count
-        centre = np.array([0.22 * length * np.cos(turn), 0.22 * width * np.sin(turn), height * 0.42]) * (count > 1)
+        centre = np.array([0.22 * length * np.cos(turn), 0.22 * width * np.sin(turn), height * 0.42]) * (
+            count > 1
+        )
         centre[2] = height * 0.42
         radii = np.array([0.30 * length, 0.30 * width, 0.46 * height]) * rng.uniform(0.8, 1.1)
         clump(builder, centre, radii, rng, spikes=(0, 3, 7)[detail])

@@ -64,14 +64,25 @@ def _utility_pole(builder: MeshBuilder, size: tuple[float, float, float], detail
         builder.box((-0.06, -width / 2, z), (0.06, width / 2, z + 0.12), Surface.BARK)
     if detail:
         for y in (-0.45, -0.2, 0.2, 0.45):
-            builder.box((-0.04, y * width - 0.04, height - 0.38), (0.04, y * width + 0.04, height - 0.2), Surface.STEEL)
+            builder.box(
+                (-0.04, y * width - 0.04, height - 0.38),
+                (0.04, y * width + 0.04, height - 0.2),
+                Surface.STEEL,
+            )
 
 
 def _delineator(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -> None:
     length, width, height = size
     half = (length / 2, width / 2)
-    builder.box((-half[0], -half[1], 0), (half[0], half[1], height * 0.68), Surface.SIGN, without="-z", unit_uv=False)
-    builder.box((-half[0], -half[1], height * 0.68), (half[0], half[1], height * 0.88), Surface.PLASTIC, without="-z+z")
+    builder.box(
+        (-half[0], -half[1], 0), (half[0], half[1], height * 0.68), Surface.SIGN, without="-z", unit_uv=False
+    )
+    builder.box(
+        (-half[0], -half[1], height * 0.68),
+        (half[0], half[1], height * 0.88),
+        Surface.PLASTIC,
+        without="-z+z",
+    )
     builder.box((-half[0], -half[1], height * 0.88), (half[0], half[1], height), Surface.PAINT, without="-z")
 
 
@@ -81,7 +92,13 @@ def _lamp_post(builder: MeshBuilder, size: tuple[float, float, float], detail: i
     foot = -width + 0.17
     sides = 6 if detail else 3
     builder.prism((0, foot, 0), (0, foot, height - 0.35), (0.11, 0.07), Surface.STEEL, sides=sides)
-    builder.prism((0, foot, height - 0.40), (0, -0.3, height - 0.08), (0.06, 0.045), Surface.STEEL, sides=4 if detail else 3)
+    builder.prism(
+        (0, foot, height - 0.40),
+        (0, -0.3, height - 0.08),
+        (0.06, 0.045),
+        Surface.STEEL,
+        sides=4 if detail else 3,
+    )
     builder.box((-0.17, -0.75, height - 0.12), (0.17, 0.0, height), Surface.STEEL, without="-z")
     builder.polygon(
         [(-0.15, -0.70, height - 0.12), (0.15, -0.70, height - 0.12), (0.15, -0.05, height - 0.12), (-0.15, -0.05, height - 0.12)],
@@ -97,7 +114,9 @@ def _quarter(name: str, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     right = (y.max() - y) / np.ptp(y)
     up = (z - z.min()) / np.ptp(z)
     margin = 0.015
-    return np.stack([u0 + margin + right * (u1 - u0 - 2 * margin), v0 + margin + up * (v1 - v0 - 2 * margin)], axis=1)
+    return np.stack(
+        [u0 + margin + right * (u1 - u0 - 2 * margin), v0 + margin + up * (v1 - v0 - 2 * margin)], axis=1
+    )
 
 
 def _plate(builder: MeshBuilder, outline: np.ndarray, face: str, x: float) -> None:
@@ -124,7 +143,9 @@ def _sign(face: str, sides: int) -> _Maker:
         outline *= width / np.ptp(outline[:, 0])
         outline[:, 1] += height - outline[:, 1].max()
         _plate(builder, outline, face, -0.035)
-        builder.prism((0, 0, 0), (0, 0, height - 0.1), (0.035, 0.035), Surface.STEEL, sides=5 if detail else 3)
+        builder.prism(
+            (0, 0, 0), (0, 0, height - 0.1), (0.035, 0.035), Surface.STEEL, sides=5 if detail else 3
+        )
 
     return make
 
@@ -138,7 +159,9 @@ def _board(builder: MeshBuilder, size: tuple[float, float, float], detail: int) 
         builder.prism((0, y, 0), (0, y, height - 0.1), (0.06, 0.06), Surface.STEEL, sides=5 if detail else 3)
     if detail:
         for z in (low + 0.2 * (height - low), low + 0.8 * (height - low)):
-            builder.box((-0.03, -width * 0.48, z - 0.03), (0.02, width * 0.48, z + 0.03), Surface.STEEL, without="-x")
+            builder.box(
+                (-0.03, -width * 0.48, z - 0.03), (0.02, width * 0.48, z + 0.03), Surface.STEEL, without="-x"
+            )
 
 
 def _gantry(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -> None:
@@ -151,10 +174,22 @@ def _gantry(builder: MeshBuilder, size: tuple[float, float, float], detail: int)
         builder.box((-0.15, -half, z), (0.15, half, z + 0.22), Surface.STEEL)
     if detail:
         for y in np.linspace(-half + 0.5, half - 1.5, 13):
-            bar = [(-0.16, y, height - 2.0), (-0.16, y + 0.10, height - 2.0), (-0.16, y + 1.0, height - 1.2), (-0.16, y + 0.9, height - 1.2)]
+            bar = [
+                (-0.16, y, height - 2.0),
+                (-0.16, y + 0.10, height - 2.0),
+                (-0.16, y + 1.0, height - 1.2),
+                (-0.16, y + 0.9, height - 1.2),
+            ]
             builder.polygon(bar, Surface.STEEL, facing=(-1, 0, 0))
     for left, right in ((-0.06, -0.42), (-0.52, -0.90)):
-        outline = np.array([(left * half, height - 2.7), (right * half, height - 2.7), (right * half, height), (left * half, height)])
+        outline = np.array(
+            [
+                (left * half, height - 2.7),
+                (right * half, height - 2.7),
+                (right * half, height),
+                (left * half, height),
+            ]
+        )
         _plate(builder, outline, "gantry", -0.30)
 
 
@@ -168,7 +203,12 @@ def _rail(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -
         profile = [(0.15, low), (0.15, top)]
     for sign in (1, -1):
         for (y0, z0), (y1, z1) in zip(profile[:-1], profile[1:], strict=True):
-            quad = [(-half, sign * y0, z0), (half, sign * y0, z0), (half, sign * y1, z1), (-half, sign * y1, z1)]
+            quad = [
+                (-half, sign * y0, z0),
+                (half, sign * y0, z0),
+                (half, sign * y1, z1),
+                (-half, sign * y1, z1),
+            ]
             builder.polygon(quad, Surface.STEEL, facing=(0, sign, 0))
     builder.box((-half, -0.15, low), (half, 0.15, top), Surface.STEEL, without="+y-y-x+x")
     for x in np.arange(-half + 1.0, half, 2.0) if detail else (-half + 1.0, half - 3.0):
@@ -184,12 +224,23 @@ def _barrier(builder: MeshBuilder, size: tuple[float, float, float], detail: int
         profile = [(wide, 0.0), (0.28 * wide, height)]
     for sign in (1, -1):
         for (y0, z0), (y1, z1) in zip(profile[:-1], profile[1:], strict=True):
-            quad = [(-half, sign * y0, z0), (half, sign * y0, z0), (half, sign * y1, z1), (-half, sign * y1, z1)]
+            quad = [
+                (-half, sign * y0, z0),
+                (half, sign * y0, z0),
+                (half, sign * y1, z1),
+                (-half, sign * y1, z1),
+            ]
             builder.polygon(quad, Surface.CONCRETE, facing=(0, sign, 0.1))
-        end = [(sign * half, sign * y, z) for y, z in profile] + [(sign * half, -sign * y, z) for y, z in profile[::-1]]
+        end = [(sign * half, sign * y, z) for y, z in profile] + [
+            (sign * half, -sign * y, z) for y, z in profile[::-1]
+        ]
         builder.polygon(end, Surface.CONCRETE, facing=(sign, 0, 0))
     y = 0.28 * wide
-    builder.polygon([(-half, -y, height), (half, -y, height), (half, y, height), (-half, y, height)], Surface.CONCRETE, facing=(0, 0, 1))
+    builder.polygon(
+        [(-half, -y, height), (half, -y, height), (half, y, height), (-half, y, height)],
+        Surface.CONCRETE,
+        facing=(0, 0, 1),
+    )
 
 
 def _noise_wall(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -> None:
@@ -201,7 +252,12 @@ def _noise_wall(builder: MeshBuilder, size: tuple[float, float, float], detail: 
     if detail:
         for z in (0.25, 1.2, 2.2):
             for sign in (1, -1):
-                strip = [(-half, sign * 0.065, z), (half, sign * 0.065, z), (half, sign * 0.065, z + 0.06), (-half, sign * 0.065, z + 0.06)]
+                strip = [
+                    (-half, sign * 0.065, z),
+                    (half, sign * 0.065, z),
+                    (half, sign * 0.065, z + 0.06),
+                    (-half, sign * 0.065, z + 0.06),
+                ]
                 builder.polygon(strip, Surface.PLASTIC, facing=(0, sign, 0))
 
 
@@ -214,7 +270,9 @@ def _fence(builder: MeshBuilder, size: tuple[float, float, float], detail: int) 
     for i in range(count):
         x = -half + i * step
         top = height - 0.05 * (i % 2)
-        builder.box((x, -0.02, 0.05), (x + step * (0.86 if detail else 1), 0.02, top), Surface.BARK, without="-z-x+x")
+        builder.box(
+            (x, -0.02, 0.05), (x + step * (0.86 if detail else 1), 0.02, top), Surface.BARK, without="-z-x+x"
+        )
     for z in (0.35, height - 0.4):
         builder.box((-half, -width / 2, z), (half, width / 2, z + 0.1), Surface.BARK, without="-x+x")
     builder.box((-half, -0.055, 0), (-half + 0.12, 0.055, height), Surface.BARK, without="-z")
@@ -223,5 +281,7 @@ def _fence(builder: MeshBuilder, size: tuple[float, float, float], detail: int) 
 def _stone_wall(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -> None:
     length, width, height = size
     half = length / 2
-    builder.box((-half, -width * 0.42, 0), (half, width * 0.42, height - 0.12), Surface.CONCRETE, without="-z+z")
+    builder.box(
+        (-half, -width * 0.42, 0), (half, width * 0.42, height - 0.12), Surface.CONCRETE, without="-z+z"
+    )
     builder.box((-half, -width / 2, height - 0.12), (half, width / 2, height), Surface.CONCRETE)

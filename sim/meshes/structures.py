@@ -18,7 +18,13 @@ FLOOR = 3.2
 def structure_models() -> tuple[Model, ...]:
     """Make buildings, bridges, distant woods and hills."""
     houses = tuple(
-        Model(name=name, kind=Kind.BUILDING, size=size, lods=(_house(size, True), _house(size, False)), switch=(90.0,))
+        Model(
+            name=name,
+            kind=Kind.BUILDING,
+            size=size,
+            lods=(_house(size, True), _house(size, False)),
+            switch=(90.0,),
+        )
         for name, size in (
             ("house-a", (9.6, 9.6, 8.6)),
             ("house-b", (12.8, 9.6, 6.8)),
@@ -27,7 +33,13 @@ def structure_models() -> tuple[Model, ...]:
         )
     )
     blocks = tuple(
-        Model(name=name, kind=Kind.BUILDING, size=size, lods=(_block(size, True), _block(size, False)), switch=(90.0,))
+        Model(
+            name=name,
+            kind=Kind.BUILDING,
+            size=size,
+            lods=(_block(size, True), _block(size, False)),
+            switch=(90.0,),
+        )
         for name, size in (
             ("block-a", (19.2, 12.8, 16.6)),
             ("block-b", (25.6, 12.8, 10.2)),
@@ -40,10 +52,12 @@ def structure_models() -> tuple[Model, ...]:
         Model(name="bridge-b", kind=Kind.BRIDGE, size=(6.0, 60.0, 7.0), lods=(_bridge((6.0, 60.0, 7.0)),)),
     )
     woods = tuple(
-        Model(name=f"woods-{letter}", kind=Kind.TREE, size=(120.0, 14.0, 13.0), lods=(_woods(letter),)) for letter in "abc"
+        Model(name=f"woods-{letter}", kind=Kind.TREE, size=(120.0, 14.0, 13.0), lods=(_woods(letter),))
+        for letter in "abc"
     )
     hills = tuple(
-        Model(name=f"hill-{letter}", kind=Kind.HILL, size=(900.0, 260.0, 60.0), lods=(_hill(letter),)) for letter in "abc"
+        Model(name=f"hill-{letter}", kind=Kind.HILL, size=(900.0, 260.0, 60.0), lods=(_hill(letter),))
+        for letter in "abc"
     )
     return houses + blocks + bridges + woods + hills
 
@@ -63,10 +77,22 @@ def _house(size: tuple[float, float, float], detail: bool) -> Mesh:
         if detail:
             # Underside of the eaves: a dark line between wall and roof.
             builder.polygon(np.array(slope) - (0, 0, 0.10), Surface.PLASTIC, facing=(0, -sign, -1))
-            edge = np.array([slope[0], slope[1], (slope[1][0], slope[1][1], slope[1][2] - 0.10), (slope[0][0], slope[0][1], slope[0][2] - 0.10)])
+            edge = np.array(
+                [
+                    slope[0],
+                    slope[1],
+                    (slope[1][0], slope[1][1], slope[1][2] - 0.10),
+                    (slope[0][0], slope[0][1], slope[0][2] - 0.10),
+                ]
+            )
             builder.polygon(edge, Surface.PAINT, facing=(0, sign, 0))
     if detail:
-        builder.box((length * 0.18, -0.35, height - 1.2), (length * 0.18 + 0.7, 0.35, height), Surface.ROOF, without="-z")
+        builder.box(
+            (length * 0.18, -0.35, height - 1.2),
+            (length * 0.18 + 0.7, 0.35, height),
+            Surface.ROOF,
+            without="-z",
+        )
     return scaled_to(builder, size)
 
 
@@ -75,10 +101,21 @@ def _block(size: tuple[float, float, float], detail: bool) -> Mesh:
     builder = MeshBuilder()
     half_x, half_y = length / 2 - 0.2, width / 2 - 0.2
     builder.box((-half_x, -half_y, 0), (half_x, half_y, height - 0.6), Surface.FACADE, without="-z")
-    builder.box((-half_x - 0.2, -half_y - 0.2, height - 0.7), (half_x + 0.2, half_y + 0.2, height), Surface.CONCRETE)
+    builder.box(
+        (-half_x - 0.2, -half_y - 0.2, height - 0.7), (half_x + 0.2, half_y + 0.2, height), Surface.CONCRETE
+    )
     if detail:
-        builder.box((-half_x - 0.05, -half_y - 0.05, 0), (half_x + 0.05, half_y + 0.05, 0.5), Surface.CONCRETE, without="-z")
-        builder.box((-half_x - 0.12, -half_y - 0.12, FLOOR), (half_x + 0.12, half_y + 0.12, FLOOR + 0.25), Surface.CONCRETE)
+        builder.box(
+            (-half_x - 0.05, -half_y - 0.05, 0),
+            (half_x + 0.05, half_y + 0.05, 0.5),
+            Surface.CONCRETE,
+            without="-z",
+        )
+        builder.box(
+            (-half_x - 0.12, -half_y - 0.12, FLOOR),
+            (half_x + 0.12, half_y + 0.12, FLOOR + 0.25),
+            Surface.CONCRETE,
+        )
     return scaled_to(builder, size)
 
 
@@ -101,11 +138,21 @@ def _bridge(size: tuple[float, float, float]) -> Mesh:
             builder.box((x - 0.45, min(sign * inner, sign * (inner + 0.9)), 0), (x + 0.45, max(sign * inner, sign * (inner + 0.9)), soffit), Surface.CONCRETE, without="-z+z")  # fmt: skip
         # The embankment that carries the crossing road.
         foot = inner + 1.0
-        slope = [(-half_x + 0.5, sign * foot, 0), (half_x - 0.5, sign * foot, 0), (half_x - 0.5, sign * (outer - 2), soffit), (-half_x + 0.5, sign * (outer - 2), soffit)]
+        slope = [
+            (-half_x + 0.5, sign * foot, 0),
+            (half_x - 0.5, sign * foot, 0),
+            (half_x - 0.5, sign * (outer - 2), soffit),
+            (-half_x + 0.5, sign * (outer - 2), soffit),
+        ]
         builder.polygon(slope, Surface.CONCRETE, facing=(0, -sign, 1))
         for end in (1, -1):
             x0, x1 = end * (half_x - 0.5), end * (half_x + 0.0)
-            side = [(x0, sign * foot, 0), (x1, sign * outer, 0), (x1, sign * outer, deck - 0.4), (x0, sign * (outer - 2), soffit)]
+            side = [
+                (x0, sign * foot, 0),
+                (x1, sign * outer, 0),
+                (x1, sign * outer, deck - 0.4),
+                (x0, sign * (outer - 2), soffit),
+            ]
             builder.polygon(side, Surface.GRASS, facing=(end, 0, 0))
     return scaled_to(builder, size)
 
@@ -140,7 +187,12 @@ def _hill(letter: str) -> Mesh:
     x = np.linspace(-450, 450, count)
     crest = 20 * np.sqrt(np.clip(1 - (x / 455) ** 2, 0, 1))
     for octave in range(1, 6):
-        crest += 16 / octave * np.sin(x / 900 * 2 * np.pi * octave + rng.uniform(0, 2 * np.pi)) * np.clip(1 - (x / 450) ** 2, 0, 1)
+        crest += (
+            16
+            / octave
+            * np.sin(x / 900 * 2 * np.pi * octave + rng.uniform(0, 2 * np.pi))
+            * np.clip(1 - (x / 450) ** 2, 0, 1)
+        )
     crest = np.clip(crest + 8, 0.0, None) * np.clip(1 - (x / 450) ** 4, 0, 1)
     rows = []
     for y, share in ((-130, 0.0), (-70, 0.55), (0, 1.0), (70, 0.55), (130, 0.0)):
