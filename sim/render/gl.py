@@ -15,8 +15,10 @@ from sim.render.context import check, context
 from sim.render.ground import MARGIN, cut, grain_texture, road_texture
 from sim.render.instances import COMMAND, INSTANCE, Library, in_bands
 from sim.render.programs import program, set_uniforms
+from sim.render.silhouettes import SilhouettePass
 from sim.render.sky import HIGHEST, panorama
 from sim.render.types import Picture, Silhouettes, Stage
+from sim.render.view import view_matrices
 from sim.textures import texture_array
 from sim.world import Bodies, WorldState
 
@@ -164,7 +166,10 @@ class GlRenderer:
 
     def silhouettes(self, state: WorldState, camera: Camera, pose: Pose) -> Silhouettes:
         """Draw each vehicle alone, as the identity pass draws it."""
-        raise NotImplementedError
+        with context() as ctx:
+            found = self._silhouettes.draw(ctx, self._alone, self._library, state.vehicles, camera, pose)
+            check(ctx, "drawing silhouettes")
+        return found
 
     def _keep(self, thing: Any) -> Any:
         self._things.append(thing)
@@ -219,6 +224,9 @@ class GlRenderer:
         keep, stage, light = self._keep, self._stage, self._stage.light
         self._body_shadow = keep(program(ctx, "body", "mask", "SHADOW"))
         self._body_shadow_array = self._bodies(ctx, self._body_shadow, "3f 24x", "3f 2f 3f 8x/i")
+        self._alone = keep(program(ctx, "body", "alone", "ALONE"))
+        alone = self._bodies(ctx, self._alone, "3f 24x", "3f 2f 3f 4x 1u/i", "i_id")
+        self._silhouettes = keep(SilhouettePass(ctx, alone, self._instances, self._commands, self._size))
         self._body = keep(program(ctx, "body", "body", "COLOUR", shared=("light",)))
         self._body_array = keep(
             ctx.vertex_array(
@@ -285,26 +293,6 @@ class GlRenderer:
                 self._faces,
             )
         )
-
-
-def view_matrices(camera: Camera, pose: Pose) -> dict[str, Any]:
-    """Return the uniforms of a view: ``u_clip`` from camera-relative world metres to clip space, and ``u_forward``.
-
-    Image rows run downward and so do the target's: row 0 is the first that is read back, and nothing is flipped.
-    """
-    near, far = camera.near, camera.far
-    projection = np.array(
-        [
-            [2 * camera.focal / camera.width, 0, 2 * camera.cx / camera.width - 1, 0],
-            [0, 2 * camera.focal / camera.height, 2 * camera.cy / camera.height - 1, 0],
-            [0, 0, (far + near) / (far - near), -2 * far * near / (far - near)],
-            [0, 0, 1, 0],
-        ]
-    )
-    turned = np.eye(4)
-    turned[:3, :3] = pose.rotation
-    clip = projection @ turned
-    return {"u_clip": clip.T.astype("<f4").tobytes(), "u_forward": tuple(pose.rotation[2])}
 
 
 def line_table(edges: NDArray[np.float64], styles: NDArray[np.uint8]) -> NDArray[np.float64]:

@@ -87,6 +87,15 @@ class Library:
         for row, model in zip(self._switch, models, strict=True):
             row[: len(model.switch)] = model.switch
         self._reach = np.array([_reach(model) for model in models])
+        self._bounds = np.array(
+            [
+                [
+                    np.min([mesh.vertices.min(axis=0) for mesh in model.lods], axis=0),
+                    np.max([mesh.vertices.max(axis=0) for mesh in model.lods], axis=0),
+                ]
+                for model in models
+            ]
+        )
 
     def select(
         self, bodies: Bodies, camera: Camera, pose: Pose, *, widen: float = 1.0, coarsest: bool = False
@@ -142,6 +151,16 @@ class Library:
         out["colour"][:, 3] = chosen.lamps
         out["id"] = chosen.ids
         return out
+
+    def corners(self, bodies: Bodies, selection: Selection) -> NDArray[np.float64]:
+        """Return (M, 8, 3) world metres: corners of the boxes around the selected bodies, as they are turned."""
+        chosen = bodies.take(selection.rows)
+        bounds = self._bounds[chosen.models] * (chosen.sizes / self.sizes[chosen.models])[:, None, :]
+        picks = np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)])
+        local = np.stack([bounds[:, picks[:, axis], axis] for axis in range(3)], axis=-1)
+        cos, sin = np.cos(chosen.yaws)[:, None], np.sin(chosen.yaws)[:, None]
+        x, y = cos * local[..., 0] - sin * local[..., 1], sin * local[..., 0] + cos * local[..., 1]
+        return np.stack([x, y, local[..., 2]], axis=-1) + chosen.positions[:, None, :]
 
     def commands(self, meshes: NDArray[np.int32]) -> NDArray[np.void]:
         """Return one `COMMAND` for each run of equal meshes in (M,) ``meshes``."""

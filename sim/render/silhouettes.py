@@ -1,0 +1,213 @@
+"""Each vehicle drawn alone: how many pixels it would show if nothing stood before it.
+
+Vehicles whose boxes in the image do not overlap share one drawing; each of them is then counted within its own box.
+Inside the frame the drawing goes through the same viewport and matrix as the picture's identities, so that the
+rasteriser covers exactly the same pixels; what lies outside the frame comes from a target three times as wide and high.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.camera import Camera, Pose
+from sim.render.instances import COMMAND, Library, Selection
+from sim.render.types import Silhouettes
+from sim.render.view import view_matrices
+from sim.world import Bodies
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawing:
+    """Some of N vehicles, drawn together.
+
+    Attributes:
+        rows: (M,) which of the vehicles.
+        area: x0, y0, x1, y1 px: the part of the target that holds them all.
+    """
+
+    rows: NDArray[np.intp]
+    area: tuple[int, int, int, int]
+
+
+def image_boxes(library: Library, bodies: Bodies, selection: Selection, camera: Camera, pose: Pose) -> Ints:
+    """Return (M, 4) x0, y0, x1, y1 px that surely hold the selected bodies, cut at the extended frame."""
+    corners = library.corners(bodies, selection)
+    local = (corners - pose.position) @ pose.rotation.T
+    depth = local[..., 2]
+    cut = (depth < camera.near).any(axis=1)
+    safe = np.where(depth < camera.near, 1.0, depth)
+    x = camera.focal * local[..., 0] / safe + camera.cx
+    y = camera.focal * local[..., 1] / safe + camera.cy
+    width, height = camera.width, camera.height
+    box = np.stack([x.min(1) - 1, y.min(1) - 1, x.max(1) + 2, y.max(1) + 2], axis=1)
+    box[cut] = -width, -height, 2 * width, 2 * height
+    low, high = np.array([-width, -height] * 2), np.array([2 * width, 2 * height] * 2)
+    return np.floor(np.clip(box, low, high)).astype(np.int64)
+
+
+def layered(boxes: Ints, rows: NDArray[np.intp]) -> list[Drawing]:
+    """Spread boxes over as few drawings as a greedy choice finds, none overlapping within one.
+
+    Args:
+        boxes: (N, 4) x0, y0, x1, y1.
+        rows: (M,) those to draw.
+    """
+    layers: list[list[int]] = []
+    for row in rows.tolist():
+        x0, y0, x1, y1 = boxes[row].tolist()
+        for members in layers:
+            other = boxes[members]
+            if not ((other[:, 0] < x1) & (other[:, 2] > x0) & (other[:, 1] < y1) & (other[:, 3] > y0)).any():
+                members.append(row)
+                break
+        else:
+            layers.append([row])
+    drawings = []
+    for members in layers:
+        held = boxes[members]
+        area = (*held[:, :2].min(axis=0).tolist(), *held[:, 2:].max(axis=0).tolist())
+        drawings.append(Drawing(rows=np.array(members), area=area))
+    return drawings
+
+
+class SilhouettePass:
+    """Draws vehicles alone and counts them.
+
+    Args:
+        ctx: The context, current.
+        array: Vertex array of the body shader that writes `INSTANCE` ids.
+        instances: Its buffer of instances.
+        commands: Buffer of draw commands.
+        size: Width and height of the frame.
+    """
+
+    def __init__(self, ctx: Any, array: Any, instances: Any, commands: Any, size: tuple[int, int]) -> None:
+        self._array, self._instances, self._commands = array, instances, commands
+        self._frame = ctx.framebuffer([ctx.renderbuffer(size, 1, dtype="u2")])
+        self._wide = ctx.framebuffer([ctx.renderbuffer((3 * size[0], 3 * size[1]), 1, dtype="u2")])
+
+    def release(self) -> None:
+        """Give the graphics memory back."""
+        for target in (self._frame, self._wide):
+            target.color_attachments[0].release()
+            target.release()
+
+    def draw(
+        self, ctx: Any, shader: Any, library: Library, vehicles: Bodies, camera: Camera, pose: Pose
+    ) -> Silhouettes:
+        """Draw and count.
+
+        Args:
+            ctx: The context, current.
+            shader: The program of the array.
+            library: The meshes.
+            vehicles: Those to count.
+            camera: The intrinsics.
+            pose: The camera's pose.
+        """
+        width, height = camera.width, camera.height
+        selection = library.select(vehicles, camera, pose, widen=3.0)
+        boxes = image_boxes(library, vehicles, selection, camera, pose)
+        kept = (boxes[:, 0] < boxes[:, 2]) & (boxes[:, 1] < boxes[:, 3])
+        selection = Selection(rows=selection.rows[kept], meshes=selection.meshes[kept])
+        boxes = boxes[kept]
+        count = len(selection)
+        instances = library.instances(vehicles, selection, pose)
+        instances["id"] = np.arange(1, count + 1)
+        low, high = np.array([0, 0, 0, 0]), np.array([width, height, width, height])
+        inner = np.clip(boxes, low, high)
+        inside = np.flatnonzero((inner[:, 0] < inner[:, 2]) & (inner[:, 1] < inner[:, 3]))
+        outside = np.flatnonzero((boxes != inner).any(axis=1))
+        shift = np.array([width, height, width, height])
+        jobs = [(self._frame, camera, inner, drawing) for drawing in layered(inner, inside)]
+        wide = replace(
+            camera, width=3 * width, height=3 * height, cx=camera.cx + width, cy=camera.cy + height
+        )
+        jobs += [(self._wide, wide, boxes + shift, drawing) for drawing in layered(boxes + shift, outside)]
+        if not jobs:
+            return _counted(vehicles.ids[selection.rows], {}, {}, count)
+
+        order = np.concatenate([drawing.rows for *_, drawing in jobs])
+        commands, spans = _commands(library, selection.meshes, [drawing.rows for *_, drawing in jobs])
+        self._instances.write(instances[order])
+        self._commands.write(commands)
+        found: dict[int, tuple[int, int, NDArray[np.bool_]]] = {}
+        beyond: dict[int, tuple[int, int, NDArray[np.bool_]]] = {}
+        ctx.enable_only(ctx.CULL_FACE)
+        ctx.front_face = "cw"
+        current = None
+        for (target, view, held, drawing), (first, draws) in zip(jobs, spans, strict=True):
+            if target is not current:
+                target.use()
+                shader["u_clip"].write(view_matrices(view, pose)["u_clip"])
+                current = target
+            x0, y0, x1, y1 = drawing.area
+            area = (x0, y0, x1 - x0, y1 - y0)
+            target.clear(viewport=area)
+            ctx.scissor = area
+            self._array.render_indirect(self._commands, count=draws, first=first)
+            ctx.scissor = None
+            raw = target.read(viewport=area, components=1, dtype="u2", alignment=1)
+            picture = np.frombuffer(raw, np.uint16).reshape(y1 - y0, x1 - x0)
+            for row in drawing.rows.tolist():
+                a, b, c, d = held[row].tolist()
+                mask = picture[b - y0 : d - y0, a - x0 : c - x0] == row + 1
+                if target is self._frame:
+                    found[row] = _trimmed(b, a, mask)
+                else:
+                    mask[
+                        max(height - b, 0) : max(2 * height - b, 0), max(width - a, 0) : max(2 * width - a, 0)
+                    ] = False
+                    beyond[row] = _trimmed(b - height, a - width, mask)
+        return _counted(vehicles.ids[selection.rows], found, beyond, count)
+
+
+def _commands(
+    library: Library, meshes: NDArray[np.int32], drawings: list[NDArray[np.intp]]
+) -> tuple[NDArray[np.void], list[tuple[int, int]]]:
+    """Return the commands of all drawings, instances counted through, and where each drawing's begin and how many."""
+    parts, spans, base, first = [], [], 0, 0
+    for rows in drawings:
+        part = library.commands(meshes[rows])
+        part["base_instance"] += base
+        parts.append(part)
+        spans.append((first, len(part)))
+        base += len(rows)
+        first += len(part)
+    return np.concatenate(parts).astype(COMMAND), spans
+
+
+def _trimmed(row: int, column: int, mask: NDArray[np.bool_]) -> tuple[int, int, NDArray[np.bool_]]:
+    """Cut a mask to what is set in it."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not len(rows):
+        return row, column, np.zeros((0, 0), bool)
+    y0, y1, x0, x1 = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
+    return row + int(y0), column + int(x0), mask[y0:y1, x0:x1]
+
+
+def _counted(
+    ids: NDArray[np.uint32],
+    found: dict[int, tuple[int, int, NDArray[np.bool_]]],
+    beyond: dict[int, tuple[int, int, NDArray[np.bool_]]],
+    count: int,
+) -> Silhouettes:
+    nothing = (0, 0, np.zeros((0, 0), bool))
+    pixels, full = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    boxes = np.full((count, 4), np.nan)
+    masks = tuple(found.get(row, nothing) for row in range(count))
+    for row in range(count):
+        parts = [part for part in (masks[row], beyond.get(row, nothing)) if part[2].size]
+        pixels[row] = np.count_nonzero(masks[row][2])
+        full[row] = sum(np.count_nonzero(part[2]) for part in parts)
+        if parts:
+            boxes[row, :2] = min(part[1] for part in parts), min(part[0] for part in parts)
+            boxes[row, 2] = max(part[1] + part[2].shape[1] for part in parts)
+            boxes[row, 3] = max(part[0] + part[2].shape[0] for part in parts)
+    return Silhouettes(ids=ids, pixels=pixels, pixels_full=full, boxes=boxes, masks=masks)
