@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 
-LOST_FRAMES = 0.02
-"""A file that holds fewer of the frames it announces than all but this share counts as truncated."""
+LOST_SHARE = 0.02
+"""A file that holds less of what it announces than all but this share counts as truncated."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +35,7 @@ class Video:
         width: Pixels.
         height: Pixels.
         rate: Frames a second, on average.
-        announced: How many frames the file says it has; 0 where it does not say.
+        announced: How many coded frames the file says it has; 0 where it does not say.
     """
 
     def __init__(self, path: Path) -> None:
@@ -46,7 +46,7 @@ class Video:
         """
         self.path = path
         if not path.is_file():
-            raise InputError(f"{path}: no such file; wanted a video")
+            raise InputError(f"{path}: {'is no file' if path.exists() else 'no such file'}; wanted a video")
         try:
             self._container = av.open(str(path))
         except (av.FFmpegError, OSError) as error:
@@ -59,6 +59,7 @@ class Video:
             rate = self._stream.average_rate or self._stream.guessed_rate
             self.width, self.height = self._stream.width, self._stream.height
             self.announced = self._stream.frames
+            self._packets, self._end = 0, 0.0
             if not rate or not self.width or not self.height:
                 raise InputError(f"{path}: its video stream has no frames")
             self.rate = float(rate)
@@ -82,7 +83,7 @@ class Video:
         """
         tick, first, last = 0, None, -1.0
         try:
-            for frame in self._container.decode(self._stream):
+            for frame in self._decoded():
                 if (frame.width, frame.height) != (self.width, self.height):
                     raise InputError(
                         f"{self.path}: frame {tick} is {frame.width} x {frame.height}, "
@@ -100,8 +101,25 @@ class Video:
             raise InputError(f"{self.path}: breaks off after {tick} frames ({_reason(error)})") from error
         if tick == 0:
             raise InputError(f"{self.path}: its video stream has no frames")
-        if tick < (1 - LOST_FRAMES) * self.announced:
-            raise InputError(f"{self.path}: breaks off after {tick} of {self.announced} frames")
+        if self._missing():
+            raise InputError(f"{self.path}: breaks off after {tick} frames, at {last:.2f} s")
+
+    def _decoded(self) -> Iterator[av.VideoFrame]:
+        for packet in self._container.demux(self._stream):
+            self._packets += packet.size > 0
+            for frame in packet.decode():
+                self._end = max(self._end, frame.time or 0.0)
+                yield frame
+
+    def _missing(self) -> bool:
+        """Say whether less came than the file announces: coded frames (not all are shown), or seconds."""
+        few = self._packets < (1 - LOST_SHARE) * self.announced
+        seconds = 0.0
+        if self._stream.duration and self._stream.time_base:
+            seconds = float(((self._stream.start_time or 0) + self._stream.duration) * self._stream.time_base)
+        elif self._container.duration and len(self._container.streams) == 1:
+            seconds = self._container.duration / av.time_base
+        return few or self._end + 1 / self.rate < (1 - LOST_SHARE) * seconds - 1 / self.rate
 
 
 def _reason(error: Exception) -> str:
