@@ -1,0 +1,44 @@
+"""Place everything that stands beside a road."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from sim.models import Model
+from sim.params import SceneryParams
+from sim.roads import InCarRoad
+from sim.scenery.horizon import place_horizon
+from sim.scenery.lines import place_lines
+from sim.scenery.scatter import place_bridges, scatter
+from sim.scenery.settings import SPECIES
+from sim.scenery.yard import Yard
+from sim.world import Bodies
+
+
+def place_scenery(
+    road: InCarRoad, params: SceneryParams, night: bool, catalogue: Sequence[Model], seed: int
+) -> Bodies:
+    """Place everything that stands beside a road.
+
+    Trees, bushes, signs, poles and buildings are scattered: along the road as Poisson processes (trees in clumps,
+    buildings evenly), across it by eq. (12). Rails, walls, lamp posts and delineators stand in lines at fixed
+    offsets and woods and hills beyond `X_MAX`: they are no part of eq. (12). Each species has random streams of its
+    own, so that more of one moves none of another; only a bridge clears what would stick out of it.
+
+    Args:
+        road: Where.
+        params: What and how much.
+        night: Whether motorways too are lined with lamp posts in stretches.
+        catalogue: Models to choose from, by name.
+        seed: Of the episode.
+
+    Returns:
+        The pieces, ids from `FIRST_SCENERY_ID` on.
+    """
+    yard = Yard(road, params, catalogue, seed)
+    bridges = place_bridges(yard)
+    for species in SPECIES:
+        scatter(yard, species, bridges)
+    place_lines(yard, night)
+    place_horizon(yard)
+    return yard.bodies()
