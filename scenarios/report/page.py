@@ -1,0 +1,268 @@
+"""One self-contained HTML page about one tracker on one episode."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import IO, Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from scenarios.log import EpisodeLog
+from scenarios.report import figures
+from scenarios.report.history import History
+from scenarios.report.palette import CLASSES, LABELS
+from scenarios.report.tables import TILES, Row, number, plain_rows, score_row, words
+from scenarios.score.params import ScoringParams
+
+_FILM_MARKER = "<film>"  # text from outside is escaped, so that it cannot hold this
+_CHUNK = 3 << 18
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture with words beneath it.
+
+    Attributes:
+        title: The words.
+        data: The file's bytes.
+        media: Its media type.
+    """
+
+    title: str
+    data: bytes
+    media: str = "image/png"
+
+    @property
+    def base64(self) -> str:
+        """The bytes as text."""
+        return base64.b64encode(self.data).decode()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """What a `scenarios.report.recorder.Recorder` gathered.
+
+    Attributes:
+        title: Of the report.
+        width: Of the frames, px.
+        rate: Frames a second.
+        frames: How many there were.
+        history: Profiles and traces.
+        film: The video, or None where no frame came.
+        film_frames: How many frames are in it.
+        stills: Single frames.
+        figures: More pictures to show.
+        focal: Px, or None where it is not known.
+    """
+
+    title: str
+    width: int
+    rate: float
+    frames: int
+    history: History
+    film: Path | None
+    film_frames: int
+    stills: tuple[Picture, ...]
+    figures: tuple[Picture, ...]
+    focal: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows under a heading."""
+
+    title: str
+    rows: list[Row]
+
+
+def environment() -> Environment:
+    """Return the templates; everything from outside is escaped, and a name that is not given is an error."""
+    return Environment(
+        loader=PackageLoader("scenarios.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def write_page(
+    path: Path,
+    recording: Recording,
+    *,
+    log: EpisodeLog | None,
+    scores: Mapping[str, Any] | None,
+    scenario: Mapping[str, Any] | None,
+) -> None:
+    """Write the report to ``path``.
+
+    Args:
+        path: The file to write.
+        recording: Of the run.
+        log: Of the episode, or None for a recording.
+        scores: The document that ``--json`` prints, or None for a recording.
+        scenario: As resolved, or None for a recording.
+    """
+    document = scores or {}
+    scenario = scenario or {}
+    values: Mapping[str, Any] = document.get("scores") or {}
+    has_boxes = log is None or log.has_boxes
+    has_traces = log is None or log.traces is not None
+    drawn = figures.draw(recording, log=log, boxes=document.get("boxes", "amodal"), scenario=scenario)
+    html = (
+        environment()
+        .get_template("report.html.j2")
+        .render(
+            title=recording.title,
+            description=scenario.get("description", ""),
+            chips=_chips(recording, log, document),
+            film=recording.film,
+            poster=recording.stills[len(recording.stills) // 2] if recording.stills else None,
+            film_marker=Markup(_FILM_MARKER),
+            film_note=_film_note(recording),
+            has_truth=log is not None,
+            label_colours=[(label.name.lower(), colour) for label, colour in LABELS.items()],
+            map_colours=[(name, CLASSES[name]) for name in drawn.classes],
+            tiles=_tiles(values, has_boxes=has_boxes, has_traces=has_traces),
+            tables=_tables(values, has_boxes=has_boxes, has_traces=has_traces),
+            confusion=_confusion(values),
+            difficulty=plain_rows(document.get("difficulty") or {}),
+            profiles=drawn.profiles,
+            maps=drawn.maps,
+            maps_note=drawn.maps_note,
+            times=drawn.times,
+            stills=recording.stills,
+            figures=recording.figures,
+            thresholds=plain_rows(asdict(ScoringParams())) if values else [],
+            parameters=_parameters(scenario),
+            digests=list((log.hashes if log else {}).items()),
+            version=metadata.version("testtrack"),
+        )
+    )
+    before, _, after = html.partition(_FILM_MARKER)
+    with path.open("w", encoding="utf-8") as file:
+        file.write(before)
+        if recording.film is not None:
+            _write_base64(file, recording.film)
+        file.write(after)
+
+
+def _write_base64(file: IO[str], source: Path) -> None:
+    """Append a file as text, piece by piece: a long video never stands in memory whole."""
+    with source.open("rb") as data:
+        while piece := data.read(_CHUNK):
+            file.write(base64.b64encode(piece).decode())
+
+
+def _film_note(recording: Recording) -> str:
+    if recording.film_frames == recording.frames:
+        return ""
+    return (
+        f"The video shows the first {recording.film_frames / recording.rate:.0f} s"
+        f" of {recording.frames / recording.rate:.0f} s."
+    )
+
+
+def _chips(
+    recording: Recording, log: EpisodeLog | None, document: Mapping[str, Any]
+) -> list[tuple[str, str]]:
+    chips = []
+    if log is not None:
+        chips = [("scenario", log.scenario), ("seed", str(log.seed)), ("tracker", log.tracker)]
+    elif "tracker" in document:
+        chips = [("tracker", str(document["tracker"]))]
+    chips.append(("length", f"{recording.frames / recording.rate:.1f} s"))
+    chips.append(("frames", f"{recording.frames} at {recording.rate:g} a second"))
+    if document.get("fps") is not None:
+        chips.append(("processed", f"{number(document['fps'])} frames a second"))
+    if document.get("peak_rss_mb") is not None:
+        chips.append(("memory", f"{document['peak_rss_mb']:.0f} MB at most"))
+    return chips
+
+
+def _leaves(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the scores of all groups by name."""
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        if isinstance(value, Mapping) and "mean" not in value:
+            found |= {inner: leaf for inner, leaf in value.items() if inner != "confusion"}
+        else:
+            found[name] = value
+    return found
+
+
+def _tiles(values: Mapping[str, Any], *, has_boxes: bool, has_traces: bool) -> list[Row]:
+    leaves = _leaves(values)
+    return [
+        score_row(name, leaves[name], has_boxes=has_boxes, has_traces=has_traces)
+        for name in TILES
+        if name in leaves
+    ]
+
+
+def _tables(values: Mapping[str, Any], *, has_boxes: bool, has_traces: bool) -> list[Table]:
+    plain: list[Row] = []
+    groups = []
+    for name, value in values.items():
+        if isinstance(value, Mapping) and "mean" not in value:
+            rows = []
+            for inner, leaf in value.items():
+                if inner == "confusion":
+                    continue
+                nested = leaf.items() if isinstance(leaf, Mapping) and "mean" not in leaf else [("", leaf)]
+                for key, item in nested:
+                    row = score_row(inner, item, has_boxes=has_boxes, has_traces=has_traces)
+                    title = f"{row.name}: {words(key)}" if key else row.name
+                    rows.append(
+                        Row(name=title, text=row.text, exact=row.exact, note=row.note, missing=row.missing)
+                    )
+            groups.append(Table(words(name).capitalize(), rows))
+        else:
+            plain.append(score_row(name, value, has_boxes=has_boxes, has_traces=has_traces))
+    return ([Table("Tracking", plain)] if plain else []) + groups
+
+
+@dataclass(frozen=True, slots=True)
+class _Cell:
+    text: str
+    per_cent: str
+    share: float
+
+
+def _confusion(values: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the confusion matrix as rows of truth and columns of labels, shaded by the share of its row."""
+    matrix = (values.get("identification") or {}).get("confusion")
+    if not matrix:
+        return None
+    columns = list(dict.fromkeys(label for counts in matrix.values() for label in counts))
+    rows = []
+    for name, counts in matrix.items():
+        total = sum(counts.values())
+        cells = []
+        for label in columns:
+            share = counts.get(label, 0) / total if total else 0.0
+            per_cent = f"{100 * share:.0f} %" if total else ""
+            cells.append(_Cell(number(counts.get(label, 0)), per_cent, 0.75 * share))
+        rows.append({"name": words(name), "cells": cells})
+    return {"columns": [words(label) for label in columns], "rows": rows}
+
+
+def _parameters(scenario: Mapping[str, Any]) -> list[Table]:
+    """Return a table of the plain parameters and one of each group, groups in groups by their full name."""
+    tables: list[Table] = []
+
+    def add(title: str, values: Mapping[str, Any]) -> None:
+        plain = {key: value for key, value in values.items() if not isinstance(value, Mapping)}
+        if plain:
+            tables.append(Table(title, plain_rows(plain)))
+        for key, value in values.items():
+            if isinstance(value, Mapping):
+                add(words(key).capitalize(), value)
+
+    add("Scenario", scenario)
+    return tables

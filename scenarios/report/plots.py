@@ -1,0 +1,346 @@
+"""The plots of the report: SVG that goes into the page and takes its colours from there."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import itertools
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import TwoSlopeNorm
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from scenarios.report.history import TraceSamples
+from scenarios.report.palette import CLASSES, LABELS, SERIES, identity
+from tracker.types import Label
+
+Floats = NDArray[np.float64]
+
+_INK, _RULE = "#010203", "#010204"  # stand-ins: the page's own ink and rules take their place
+_STYLE: dict[str, object] = {
+    "axes.edgecolor": _RULE,
+    "axes.facecolor": "none",
+    "axes.grid": True,
+    "axes.labelcolor": _INK,
+    "axes.labelsize": 8.5,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "figure.facecolor": "none",
+    "font.family": "DejaVu Sans",
+    "font.size": 8.5,
+    "grid.color": _RULE,
+    "grid.linewidth": 0.5,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "testtrack",
+    "text.color": _INK,
+    "xtick.color": _RULE,
+    "xtick.labelcolor": _INK,
+    "xtick.labelsize": 8,
+    "ytick.color": _RULE,
+    "ytick.labelcolor": _INK,
+    "ytick.labelsize": 8,
+}
+_DPI = 144
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeAxis:
+    """Where time runs in a plot, so that the page can join it to the video.
+
+    Attributes:
+        vertical: Whether it runs downward; else to the right.
+        low: Where it begins, as a share of the plot's height or width.
+        high: Where it ends.
+        seconds: The time from the one to the other.
+    """
+
+    vertical: bool
+    low: float
+    high: float
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plot:
+    """One drawing and the words beneath it."""
+
+    title: str
+    caption: str
+    svg: Markup
+    time: TimeAxis | None = None
+
+
+def profile(
+    image: NDArray[np.uint8],
+    samples: TraceSamples,
+    *,
+    rate: float,
+    stride: int,
+    width: int,
+    colour: str | None,
+) -> tuple[Markup, TimeAxis]:
+    """Draw a temporal profile, time downward, with the traces upon it.
+
+    Args:
+        image: (T, W) bytes; without rows the traces stand on a plain ground.
+        samples: Of the traces.
+        rate: Frames a second.
+        stride: Frames from one row of ``image`` to the next.
+        width: Of the frames, px.
+        colour: "identity" (by track, else by trace), "label", or None for no traces.
+    """
+    last = int(samples.ticks.max(initial=0)) + 1
+    seconds = max(len(image) * stride, last, 2) / rate
+
+    def draw(axes: Axes) -> None:
+        axes.grid(visible=False)
+        axes.set_facecolor("#101216")
+        if image.size:
+            bright = max(float(np.quantile(image, 0.995)), 1.0)
+            extent = (0.0, float(width), len(image) * stride / rate, 0.0)
+            axes.imshow(
+                (image / bright) ** 0.7,
+                cmap="gray",
+                vmin=0,
+                vmax=1.6 if colour else 1,
+                extent=extent,
+                aspect="auto",
+                interpolation="antialiased",
+            )
+        if colour is not None and len(samples.ids):
+            segments, colours = _paths(samples, rate, stride, by_label=colour == "label")
+            axes.add_collection(
+                LineCollection(segments, colors=colours, linewidths=1.3, rasterized=True, capstyle="round")
+            )
+        axes.set(xlim=(0, width), ylim=(seconds, 0), xlabel="x, px", ylabel="time, s")
+
+    svg, (_, y0, _, y1) = _draw(draw, size=(3.7, 4.5))
+    return svg, TimeAxis(vertical=True, low=1 - y1, high=1 - y0, seconds=seconds)
+
+
+def _paths(
+    samples: TraceSamples, rate: float, stride: int, *, by_label: bool
+) -> tuple[list[Floats], list[str]]:
+    """Cut the samples into polylines of one colour each."""
+    order = np.lexsort((samples.ticks, samples.ids))
+    ids, ticks, x = samples.ids[order], samples.ticks[order], samples.x[order].astype(float)
+    times = (ticks + 0.5) / rate
+    key = samples.labels[order].astype(np.int64) if by_label else samples.owners[order]
+    new = np.flatnonzero((ids[1:] != ids[:-1]) | (ticks[1:] - ticks[:-1] > 5 * stride)) + 1
+    turn = np.flatnonzero((key[1:] != key[:-1]) & (ids[1:] == ids[:-1])) + 1
+    breaks = set(new.tolist())
+    bounds = [0, *sorted(breaks | set(turn.tolist())), len(ids)]
+    segments, colours = [], []
+    for begin, end in itertools.pairwise(bounds):
+        # Where only the colour turns, the line goes on from the last point of the old one.
+        first = begin - 1 if begin and begin not in breaks else begin
+        if end - first < 2:
+            continue
+        segments.append(np.column_stack([x[first:end], times[first:end]]))
+        if by_label:
+            colours.append(LABELS[Label(int(key[begin]))])
+        else:
+            colours.append(identity(int(key[begin])) if key[begin] else "#59606b")
+    return segments, colours
+
+
+def likelihoods(
+    background: Floats,
+    car: Floats,
+    *,
+    x: Floats,
+    v: Floats,
+    samples: Mapping[str, tuple[Floats, Floats]],
+) -> tuple[tuple[str, Markup], ...]:
+    """Draw p(x,v|B), p(x,v|C) and the log of their ratio as maps, with an episode's samples upon them.
+
+    Args:
+        background: (V, X) density, per px and px/s.
+        car: (V, X) likewise.
+        x: (X,) px from the principal point.
+        v: (V,) px/s.
+        samples: x and v of the traces, by their true class.
+    """
+    floor = 1e-9
+    ratio = np.log10(np.maximum(car, floor)) - np.log10(np.maximum(background, floor))
+    extent = (float(x[0]), float(x[-1]), float(v[0]), float(v[-1]))
+
+    def density(values: Floats) -> Callable[[Axes], None]:
+        def draw(axes: Axes) -> None:
+            logs = np.log10(np.maximum(values, floor))
+            image = axes.imshow(
+                logs,
+                origin="lower",
+                extent=extent,
+                aspect="auto",
+                cmap="cividis",
+                vmin=-7.5,
+                vmax=logs.max(),
+                interpolation="bilinear",
+            )
+            _finish_map(axes, image, "log₁₀ density", samples, extent)
+
+        return draw
+
+    def draw_ratio(axes: Axes) -> None:
+        image = axes.imshow(
+            np.clip(ratio, -3, 3),
+            origin="lower",
+            extent=extent,
+            aspect="auto",
+            cmap="PiYG_r",
+            norm=TwoSlopeNorm(0, -3, 3),
+            interpolation="bilinear",
+        )
+        axes.contour(x, v, ratio, levels=[0.0], colors="#222", linewidths=1.0)
+        _finish_map(axes, image, "log₁₀ ratio", samples, extent)
+
+    return (
+        ("Background: p(x, v | B)", _draw(density(background), size=(3.7, 3.1))[0]),
+        ("Car: p(x, v | C)", _draw(density(car), size=(3.7, 3.1))[0]),
+        ("Car against background: log ratio", _draw(draw_ratio, size=(3.7, 3.1))[0]),
+    )
+
+
+def _finish_map(
+    axes: Axes,
+    image: object,
+    label: str,
+    samples: Mapping[str, tuple[Floats, Floats]],
+    extent: tuple[float, float, float, float],
+) -> None:
+    for name, (x, v) in samples.items():
+        # White beneath the colour: a dot has to be seen on every shade of the map.
+        axes.scatter(x, v, s=5, color="white", linewidths=0, rasterized=True, zorder=3)
+        axes.scatter(x, v, s=2.5, color=CLASSES[name], linewidths=0, rasterized=True, zorder=4)
+    axes.grid(visible=False)
+    axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="x from the principal point, px", ylabel="v, px/s")
+    bar = axes.figure.colorbar(image, ax=axes, pad=0.02, fraction=0.05)  # type: ignore[arg-type]
+    bar.set_label(label)
+    bar.outline.set_visible(False)
+
+
+def lines(
+    series: Mapping[str, tuple[Floats, Floats]],
+    *,
+    seconds: float,
+    label: str,
+    limits: tuple[float | None, float | None] = (None, None),
+    colours: Sequence[str] = SERIES,
+    steps: bool = False,
+) -> tuple[Markup, TimeAxis]:
+    """Draw values over time.
+
+    Args:
+        series: Seconds and values, by name; what is no number leaves a gap.
+        seconds: Length of the episode.
+        label: Of the axis of values.
+        limits: Of it, None where the values decide.
+        colours: One a series.
+        steps: Whether values are counts, which jump.
+    """
+
+    def draw(axes: Axes) -> None:
+        for (name, (times, values)), colour in zip(series.items(), colours, strict=False):
+            axes.plot(times, values, label=name, color=colour, drawstyle="steps-mid" if steps else "default")
+        _finish_lines(axes, seconds, label, limits, legend=len(series) > 1)
+
+    return _over_time(draw, seconds)
+
+
+def bands(
+    series: Mapping[str, tuple[Floats, Floats, Floats, Floats]],
+    *,
+    seconds: float,
+    label: str,
+    colours: Mapping[str, str],
+) -> tuple[Markup, TimeAxis]:
+    """Draw medians over time within their quartiles.
+
+    Args:
+        series: Seconds, lower quartiles, medians and upper quartiles, by name.
+        seconds: Length of the episode.
+        label: Of the axis of values, which go from 0 to 1.
+        colours: By name.
+    """
+
+    def draw(axes: Axes) -> None:
+        for name, (times, low, middle, high) in series.items():
+            axes.fill_between(times, low, high, color=colours[name], alpha=0.22, linewidth=0)
+            axes.plot(times, middle, color=colours[name], label=name)
+        _finish_lines(axes, seconds, label, (-0.02, 1.02), legend=True)
+
+    return _over_time(draw, seconds)
+
+
+def stacked(
+    series: Mapping[str, Floats], times: Floats, *, seconds: float, label: str, top: float
+) -> tuple[Markup, TimeAxis]:
+    """Draw parts of a sum over time, one upon the other.
+
+    Args:
+        series: (T,) parts by name.
+        times: (T,) seconds.
+        seconds: Length of the episode.
+        label: Of the axis of values.
+        top: Its upper end: single slow frames may reach out of the plot.
+    """
+
+    def draw(axes: Axes) -> None:
+        colours = SERIES[: len(series)]
+        axes.stackplot(times, *series.values(), labels=list(series), colors=colours, linewidth=0, alpha=0.85)
+        _finish_lines(axes, seconds, label, (0, top), legend=True)
+
+    return _over_time(draw, seconds)
+
+
+def _finish_lines(
+    axes: Axes, seconds: float, label: str, limits: tuple[float | None, float | None], *, legend: bool
+) -> None:
+    axes.set(xlim=(0, seconds), xlabel="time, s", ylabel=label)
+    axes.set_ylim(*limits)
+    if legend:
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=5, handlelength=1.2, borderaxespad=0.1)
+
+
+def _over_time(draw: Callable[[Axes], None], seconds: float) -> tuple[Markup, TimeAxis]:
+    svg, (x0, _, x1, _) = _draw(draw, size=(5.0, 2.1))
+    return svg, TimeAxis(vertical=False, low=x0, high=x1, seconds=seconds)
+
+
+def _draw(
+    draw: Callable[[Axes], None], *, size: tuple[float, float]
+) -> tuple[Markup, tuple[float, float, float, float]]:
+    """Return a figure's SVG, and where its axes stand in it: left, bottom, right, top as shares."""
+    with rc_context(_STYLE):  # type: ignore[arg-type]
+        figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
+        axes = figure.subplots()
+        draw(axes)
+        buffer = io.StringIO()
+        figure.savefig(buffer, format="svg", dpi=_DPI, metadata={"Date": None, "Creator": None})
+        extents = axes.get_position().extents
+    return _inline(buffer.getvalue()), (extents[0], extents[1], extents[2], extents[3])
+
+
+def _inline(text: str) -> Markup:
+    """Turn a matplotlib SVG file into an element: no prolog or metadata, the page's colours, own ids."""
+    digest = hashlib.sha256(text.encode()).hexdigest()[:8]
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r'<g id="[^"]*">', "<g>", text)
+    text = re.sub(r'^<svg [^>]*viewBox="([^"]*)"[^>]*>', r'<svg viewBox="\1" role="img">', text)
+    text = re.sub(r'( id="|url\(#|href="#)', rf"\g<1>{digest}-", text)
+    text = text.replace(_INK, "currentColor").replace(_RULE, "var(--rule)")
+    # It is matplotlib's own output, with every text in it escaped, so it need not be escaped again.
+    return Markup(text)

@@ -1,0 +1,128 @@
+"""Scores and parameters as rows of tables: the words, the digits, and why a number is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+MEANINGS = {
+    "hota": "detection and association together, over all overlaps",
+    "deta": "detection accuracy of HOTA",
+    "assa": "association accuracy of HOTA",
+    "mota": "1 − (misses + false boxes + switches) / objects; below 0 where errors outnumber objects",
+    "idf1": "frames in which the right identity is on the object",
+    "id_switches": "an object's track is another than before",
+    "precision": "boxes that are on a scored object",
+    "recall": "scored objects with a box on them",
+    "car_recall": "car traces finally labelled car",
+    "background_recall": "background traces finally labelled background",
+    "accuracy": "scored traces finally labelled right",
+    "median_seconds_to_identify": "from a car trace's first frame until its label stays right",
+    "vehicle_coverage": "same-way vehicles, seen for 2 s or more, that carry a trace labelled car",
+    "traces_per_10s": "how much was dared",
+    "oncoming_as_car": "oncoming traces labelled car",
+}
+"""What each score says, in a line."""
+
+TILES = ("hota", "idf1", "mota", "car_recall", "background_recall", "median_seconds_to_identify")
+"""The scores that the page begins with."""
+
+_BOXES = ("hota", "deta", "assa", "mota", "idf1", "id_switches", "precision", "recall")
+_TRACES = ("car_recall", "background_recall", "accuracy", "vehicle_coverage", "oncoming_as_car")
+FRACTIONS = frozenset(_BOXES + _TRACES) - {"id_switches"}
+"""The scores that a bar is drawn for."""
+
+DASH = "–"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """A line of a table.
+
+    Attributes:
+        name: In words.
+        text: The value as printed.
+        exact: The value in full, for whoever points at it.
+        note: What it means or, where it is missing, why.
+        missing: Whether it is null.
+        share: The value as a share of 1 to draw a bar with, or None.
+    """
+
+    name: str
+    text: str
+    exact: str = ""
+    note: str = ""
+    missing: bool = False
+    share: float | None = None
+
+
+def number(value: object) -> str:
+    """Print a value: a count as it is, another number to 3 decimals (1 from 10 on), null as a dash."""
+    if value is None:
+        return DASH
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value}"
+    if isinstance(value, float):
+        if not isfinite(value):
+            return DASH
+        return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
+    if isinstance(value, Mapping) and "mean" in value:
+        return number(value["mean"])
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return ", ".join(number(item) for item in value) or DASH
+    return str(value)
+
+
+def words(name: str) -> str:
+    """Turn a key into words: the measures' own names in capitals, others spaced."""
+    if name in ("hota", "mota", "motp"):
+        return name.upper()
+    special = {"deta": "DetA", "assa": "AssA", "idf1": "IDF1", "id_switches": "ID switches"}
+    return special.get(name) or name.replace("_", " ").replace("-", " ")
+
+
+def flat(values: Mapping[str, Any], prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield the leaves of nested mappings with the keys that lead there."""
+    for key, value in values.items():
+        if isinstance(value, Mapping) and "mean" not in value:
+            yield from flat(value, (*prefix, str(key)))
+        else:
+            yield (*prefix, str(key)), value
+
+
+def score_row(name: str, value: object, *, has_boxes: bool, has_traces: bool) -> Row:
+    """Return the row of a score."""
+    missing = number(value) == DASH
+    share = float(value) if name in FRACTIONS and isinstance(value, (int, float)) and not missing else None
+    return Row(
+        name=words(name),
+        text=number(value),
+        exact="" if missing else repr(value),
+        note=_why_null(name, has_boxes=has_boxes, has_traces=has_traces)
+        if missing
+        else MEANINGS.get(name, ""),
+        missing=missing,
+        share=None if share is None else min(max(share, 0.0), 1.0),
+    )
+
+
+def _why_null(name: str, *, has_boxes: bool, has_traces: bool) -> str:
+    if name in _BOXES:
+        return "nothing to score" if has_boxes else "this tracker gives no boxes"
+    if not has_traces:
+        return "this tracker shows no traces"
+    if name == "median_seconds_to_identify":
+        return "half of the car traces or more were never identified, or there were none"
+    return "nothing to score"
+
+
+def plain_rows(values: Mapping[str, Any]) -> list[Row]:
+    """Return the leaves of nested mappings as rows."""
+    return [
+        Row(name=" · ".join(words(key) for key in keys), text=number(value), missing=value is None)
+        for keys, value in flat(values)
+    ]
