@@ -78,7 +78,9 @@ class GlRenderer:
 
     def close(self) -> None:
         """Give the graphics memory back. A second call does nothing."""
-        with context():
+        with context() as ctx:
+            # moderngl comes back to the framebuffer that was last in use: it must not be one of those that end here.
+            ctx.detect_framebuffer(0).use()
             while self._things:
                 self._things.pop().release()
 

@@ -1,0 +1,245 @@
+"""What the camera does to a picture: windscreen, lens, exposure, noise and the recorder's compression."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sim.camera import Camera
+from sim.models import Light
+from sim.params import SensorParams
+from sim.render.types import Picture
+from sim.rng import stream
+
+Floats32 = NDArray[np.float32]
+Image = NDArray[np.uint8]
+
+_TILE = 1024
+_SHARED = 0.8
+"""Share of the noise's amplitude that all three colours have in common: coders and denoisers thin out the rest."""
+
+_DAY_LEVEL, _NIGHT_LEVEL = 112.0, 40.0
+_DAY_GAIN, _NIGHT_GAIN = (0.72, 1.35), (0.8, 1.25)
+_WIPER_SECONDS = 1.6
+_GLARE = 0.35
+
+
+@njit(cache=True, nogil=True)
+def _develop(
+    image: NDArray[np.uint8],
+    falloff: NDArray[np.float32],
+    gain: float,
+    tile: NDArray[np.float32],
+    shifts: NDArray[np.int64],
+    amplitude: NDArray[np.float32],
+    out: NDArray[np.uint8],
+) -> None:
+    """Exposure, vignetting and noise in one walk over the pixels."""
+    shared, own = np.float32(0.8), np.float32(0.6)
+    for i in range(image.shape[0]):
+        for j in range(image.shape[1]):
+            share = np.float32(gain) * falloff[i, j]
+            common = shared * tile[i + shifts[0, 0], j + shifts[0, 1]]
+            for c in range(3):
+                value = share * image[i, j, c]
+                value = min(value, np.float32(255.0))
+                noise = common + own * tile[i + shifts[c + 1, 0], j + shifts[c + 1, 1]]
+                value += noise * amplitude[int(value)] + np.float32(0.5)
+                out[i, j, c] = np.uint8(min(max(value, np.float32(0.0)), np.float32(255.0)))
+
+
+class Sensor:
+    """Turns rendered pictures into recorded frames.
+
+    The exposure follows the pictures, so frames are to be given in order; noise and rain depend on the seed and the
+    tick alone.
+
+    Args:
+        params: Noise, blur, vignetting, lag of the exposure, compression.
+        light: Night limits the exposure; how wet the road is says how hard it rains.
+        camera: Size and principal point.
+        rate: Frames a second.
+        seed: The episode's.
+    """
+
+    def __init__(self, params: SensorParams, light: Light, camera: Camera, rate: int, seed: int) -> None:
+        self._params, self._light, self._camera, self._rate, self._seed = params, light, camera, rate, seed
+        self._gain: float | None = None
+        self._last = 0
+        self._rain = min(1.0, light.wet / 1.4)
+        self._falloff = falloff(camera, params.vignetting)
+        self._tile = noise_tile(seed, camera)
+        self._amplitude = noise_amplitude(params.noise)
+
+    def expose(self, picture: Picture, tick: int, speed: float) -> Image:
+        """Record one frame.
+
+        Args:
+            picture: As rendered; it is left as it is.
+            tick: The frame's number.
+            speed: Of the camera, m/s: it slants the rain.
+
+        Returns:
+            (H, W, 3) uint8.
+        """
+        import cv2
+
+        image = picture.colour
+        if self._rain > 0:
+            image = self._through_rain(image, tick, speed)
+        if self._params.blur > 0:
+            image = np.asarray(cv2.GaussianBlur(image, (0, 0), self._params.blur))
+        if self._light.night:
+            image = _glare(image)
+        out = np.empty_like(image)
+        gain = self._exposure(image, tick)
+        rng = stream(self._seed, "sensor", "noise", tick)
+        room = np.array(self._tile.shape) - image.shape[:2]
+        shifts = rng.integers(0, room, size=(4, 2))
+        _develop(image, self._falloff, gain, self._tile, shifts, self._amplitude, out)
+        return self._compressed(out)
+
+    def _exposure(self, image: Image, tick: int) -> float:
+        """Follow the picture's mean brightness with the camera's lag."""
+        mean = float(image[::8, ::8].mean())
+        level, (low, high) = (_NIGHT_LEVEL, _NIGHT_GAIN) if self._light.night else (_DAY_LEVEL, _DAY_GAIN)
+        wanted = float(np.clip((level / max(mean, 1.0)) ** 0.6, low, high))
+        elapsed = (tick - self._last) / self._rate
+        if self._gain is None or elapsed <= 0 or self._params.exposure_lag == 0:
+            self._gain = wanted
+        else:
+            self._gain += (wanted - self._gain) * -np.expm1(-elapsed / self._params.exposure_lag)
+        self._last = tick
+        return self._gain
+
+    def _compressed(self, image: Image) -> Image:
+        """Code and decode, as the recorder would."""
+        import cv2
+
+        if self._params.compression == 0:
+            return image
+        quality = [cv2.IMWRITE_JPEG_QUALITY, 100 - self._params.compression]
+        _, code = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), quality)
+        return np.asarray(cv2.cvtColor(cv2.imdecode(code, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB))
+
+    def _through_rain(self, image: Image, tick: int, speed: float) -> Image:
+        """Lay streaks before the scene, drops on the windscreen and the grey of falling water over all."""
+        import cv2
+
+        veil = 0.05 if self._light.night else 0.16
+        mean = image.mean(axis=(0, 1))
+        share = veil * self._rain
+        image = np.asarray(
+            cv2.addWeighted(image, 1 - share, np.broadcast_to(mean, image.shape).astype(np.uint8), share, 0)
+        )
+        image = self._streaked(image, tick, speed)
+        return self._dropped(image, tick)
+
+    def _streaked(self, image: Image, tick: int, speed: float) -> Image:
+        import cv2
+
+        height, width = image.shape[:2]
+        rng = stream(self._seed, "sensor", "streaks", tick)
+        count = rng.poisson(220 * self._rain * width * height / 307200)
+        x, y = rng.uniform(0, width, count), rng.uniform(0, height, count)
+        depth = rng.uniform(1.5, 9.0, count)
+        # A drop falls at 8 m/s and comes nearer at the car's speed, for the 1/60 s that the shutter is open.
+        drop = self._camera.focal * 8.0 / 60 / depth
+        nearer = 1 / np.maximum(1 - speed / 60 / depth, 0.5) - 1
+        dx, dy = (x - self._camera.cx) * nearer, (y - self._camera.cy) * nearer + drop
+        layer = np.zeros((height, width), np.uint8)
+        strength = rng.uniform(8, 34, count) * (0.35 if self._light.night else 1.0)
+        ends = np.stack([x, y, x + dx, y + dy], axis=1)
+        for (x0, y0, x1, y1), value in zip(
+            np.round(ends * 16).astype(int).tolist(), strength.tolist(), strict=True
+        ):
+            cv2.line(layer, (x0, y0), (x1, y1), value, 1, cv2.LINE_AA, 4)
+        layer = cv2.GaussianBlur(layer, (3, 3), 0)
+        return np.asarray(cv2.add(image, cv2.merge([layer, layer, layer])))
+
+    def _dropped(self, image: Image, tick: int) -> Image:
+        """Show the scene upside down and out of focus in each drop that fell since the wiper last passed."""
+        import cv2
+
+        height, width = image.shape[:2]
+        period = max(1, round(_WIPER_SECONDS * self._rate))
+        sweep, age = divmod(tick, period)
+        rng = stream(self._seed, "sensor", "drops", sweep)
+        count = rng.poisson(70 * self._rain)
+        born = rng.uniform(0, period, count)
+        size = width / 640 * np.exp(rng.normal(1.5, 0.45, count))
+        places = np.stack([rng.uniform(0, width, count), rng.uniform(0, height, count)], axis=1)
+        small = cv2.resize(image, (width // 8, height // 8), interpolation=cv2.INTER_AREA)
+        soft = cv2.GaussianBlur(small, (0, 0), 2.0)[::-1]
+        out = image.copy()
+        for (x, y), radius in zip(places[born <= age], size[born <= age], strict=True):
+            reach = int(np.ceil(radius * 1.6))
+            x0, y0 = max(int(x) - reach, 0), max(int(y) - reach, 0)
+            x1, y1 = min(int(x) + reach, width), min(int(y) + reach, height)
+            if x1 <= x0 or y1 <= y0:
+                continue
+            across = (np.arange(x0, x1) + 0.5 - x)[None, :] / radius
+            down = (np.arange(y0, y1) + 0.5 - y)[:, None] / (1.15 * radius)
+            inside = np.clip(1.5 - np.hypot(across, down), 0, 1)[..., None] * 0.75
+            rows = np.clip(((y0 + y1) // 16 + 3 * down).astype(int), 0, soft.shape[0] - 1)
+            columns = np.clip(((x0 + x1) // 16 + 3 * across).astype(int), 0, soft.shape[1] - 1)
+            seen = soft[rows, columns].astype(np.float64) * (1.0 + 0.25 * np.clip(down, -1, 1))[..., None]
+            patch = out[y0:y1, x0:x1]
+            patch[:] = np.clip(patch + inside * (seen - patch), 0, 255).astype(np.uint8)
+        return out
+
+
+def falloff(camera: Camera, loss: float) -> Floats32:
+    """Return (H, W) factors on coded values: cos^4-like loss of light, ``loss`` of it gone in the farthest corner."""
+    x = (np.arange(camera.width) + 0.5 - camera.width / 2)[None, :]
+    y = (np.arange(camera.height) + 0.5 - camera.height / 2)[:, None]
+    radius = (x * x + y * y) / (camera.width**2 + camera.height**2) * 4
+    # Coded values go with the root of the light.
+    return np.sqrt(1 - loss * radius).astype(np.float32)
+
+
+def noise_tile(seed: int, camera: Camera) -> Floats32:
+    """Make noise of unit variance, larger than the frame, a little smooth as demosaicing leaves it."""
+    import cv2
+
+    rng = stream(seed, "sensor", "tile")
+    shape = (camera.height + 192, camera.width + 192)
+    fine = rng.standard_normal(shape, np.float32)
+    soft = 0.75 * cv2.GaussianBlur(fine, (0, 0), 0.55) + 0.5 * cv2.GaussianBlur(
+        rng.standard_normal(shape, np.float32), (0, 0), 1.4
+    )
+    return np.asarray(soft / soft.std(), np.float32)
+
+
+def noise_amplitude(noise: float) -> Floats32:
+    """Return the noise's standard deviation for each of 256 coded values.
+
+    Photon noise has a variance that grows with the light; coding by the square root makes it even, so what is left is
+    the reader's noise in the dark, and less of all near white where the curve is flat.
+
+    Args:
+        noise: Standard deviation at mid grey.
+    """
+    value = np.arange(256) / 255.0
+    curve = (
+        np.sqrt(1.0 + 0.03 / (value + 0.08))
+        * np.clip(1.25 - 0.6 * value, 0.4, 1.0)
+        * np.clip(0.3 + 6 * value, 0, 1)
+    )
+    return (noise * curve / curve[128]).astype(np.float32)
+
+
+def _glare(image: Image) -> Image:
+    """Spread what is brighter than the sensor can tell, as lenses and windscreens do."""
+    import cv2
+
+    height, width = image.shape[:2]
+    bright = cv2.subtract(image, np.full(3, 190.0))
+    small = cv2.resize(bright, (width // 4, height // 4), interpolation=cv2.INTER_AREA)
+    near = cv2.GaussianBlur(small, (0, 0), 1.5)
+    wide = cv2.GaussianBlur(small, (0, 0), 9.0)
+    halo = cv2.resize(
+        cv2.addWeighted(near, 1.0, wide, 1.6, 0), (width, height), interpolation=cv2.INTER_LINEAR
+    )
+    return np.asarray(cv2.addWeighted(image, 1.0, halo, _GLARE * 3, 0))
