@@ -87,9 +87,9 @@ def follow(
             "peak_rss_mb": peak_rss_mb(),
         }
         if directory is not None and recorder is not None:
-            from scenarios.export import mot
+            from scenarios.export.mot import write_tracks
 
-            mot.write(log.tracks, directory / "tracks.txt")
+            write_tracks(directory / "tracks.txt", log.tracks)
             write_json(directory / "summary.json", document)
             recorder.finish(None, None, None, focal=focal)
     return document

@@ -11,9 +11,9 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from scenarios.errors import InputError
 from scenarios.log import EpisodeLog, save
 from scenarios.loop import run_episode
 from scenarios.output import write_json
+from scenarios.score.params import Boxes, ScoringParams
 from scenarios.spec import Scenario
 from tracker.base import Tracker
 from tracker.registry import make
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from scenarios.report.recorder import Recorder
     from sim.simulation import Observation
 
+SCORING = ScoringParams()
 Document = dict[str, Any]
 Progress = Callable[[int], None]
 """Is told how many more frames are done."""
@@ -51,7 +53,7 @@ class Run:
     scenario: Scenario
     seeds: range
     trackers: tuple[str, ...]
-    boxes: Literal["amodal", "visible"] = "amodal"
+    boxes: Boxes = "amodal"
     odometry: bool = False
     jobs: int = 1
 
@@ -78,7 +80,9 @@ def make_tracker(name: str) -> Tracker:
     try:
         return make(name)
     except ValueError as error:
-        raise InputError(" ".join(str(error).split())) from error
+        raise InputError(str(error)) from error
+    except TypeError as error:
+        raise InputError(f"no tracker {name!r}: calling it without arguments fails: {error}") from error
 
 
 def execute(run: Run, directory: Path | None = None, progress: Progress | None = None) -> Document:
@@ -133,7 +137,7 @@ def run_seed(
 
         logs = run_episode(run.scenario, seed, trackers, odometry=run.odometry, on_frame=on_frame)
         for log in logs:
-            scores, difficulty = score(log, boxes=run.boxes)
+            scores, difficulty = score(log, boxes=run.boxes, params=SCORING)
             documents[log.tracker] = _document(run, log, scores, difficulty)
             if directory is not None:
                 _keep(run, log, documents[log.tracker], recorders[log.tracker])
@@ -149,11 +153,11 @@ def _recorder(run: Run, seed: int, tracker: str, folder: Path) -> Recorder:
 
 
 def _keep(run: Run, log: EpisodeLog, document: Document, recorder: Recorder) -> None:
-    from scenarios.export import mot
+    from scenarios.export.mot import write_tracks
 
     folder = recorder.directory
     save(log, folder / "log.npz")
-    mot.write(log.tracks, folder / "tracks.txt")
+    write_tracks(folder / "tracks.txt", log.tracks)
     write_json(folder / "scores.json", document)
     recorder.finish(log, document, run.scenario.model_dump(mode="json"))
 
@@ -170,6 +174,7 @@ def _document(run: Run, log: EpisodeLog, scores: Document, difficulty: Document)
         "frames": len(log.tracks),
         "scores": scores,
         "difficulty": difficulty,
+        "thresholds": asdict(SCORING),
         "hashes": log.hashes,
         "timing_ms": timing,
         "fps": 1e3 / sum(timing.values()),
