@@ -34,6 +34,8 @@ class TraceLog:
         vote_ids: (K,) int64, the trace.
         vote_objects: (K,) uint32, what its support points lie on.
         vote_counts: (K,) int64, how many of them.
+        vote_depths: (K,) float64, their median depth, metres along the axis, infinite in the sky; None where
+            it is not known.
     """
 
     ticks: NDArray[np.int64]
@@ -47,6 +49,7 @@ class TraceLog:
     vote_ids: NDArray[np.int64]
     vote_objects: NDArray[np.uint32]
     vote_counts: NDArray[np.int64]
+    vote_depths: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +126,8 @@ def save(log: EpisodeLog, path: Path | str) -> None:
                 [np.zeros((0, *shape)), *(value for value in values if value is not None)]
             )
     if log.traces is not None:
-        arrays |= {f"traces/{f.name}": getattr(log.traces, f.name) for f in fields(TraceLog)}
+        columns = {f"traces/{f.name}": getattr(log.traces, f.name) for f in fields(TraceLog)}
+        arrays |= {name: column for name, column in columns.items() if column is not None}
     arrays |= {f"timing_ms/{name}": values for name, values in log.timing_ms.items()}
     with moved_in(Path(path)) as part, part.open("wb") as file:
         np.savez_compressed(file, **arrays)
@@ -180,16 +184,15 @@ def _read(arrays: Mapping[str, NDArray[Any]]) -> EpisodeLog:
         **{name: plain[name] for name in _PLAIN},
         truth=tuple(truth),
         tracks=tuple(tracks),
-        traces=TraceLog(**{f.name: arrays[f"traces/{f.name}"] for f in fields(TraceLog)})
-        if with_traces
-        else None,
+        traces=TraceLog(**_under("traces/", arrays)) if with_traces else None,
         ego_speed=speed,
-        timing_ms={
-            name.removeprefix("timing_ms/"): values
-            for name, values in arrays.items()
-            if name.startswith("timing_ms/")
-        },
+        timing_ms=_under("timing_ms/", arrays),
     )
+
+
+def _under(prefix: str, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Give the arrays whose names begin with ``prefix``, without it."""
+    return {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
 
 
 def _split(rows: NDArray[Any], counts: NDArray[np.int64]) -> list[NDArray[Any]]:

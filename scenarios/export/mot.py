@@ -16,12 +16,15 @@ from scenarios.files import moved_in
 from tracker.types import Status, Tracks
 
 
-def write(frames: Iterable[Tracks], path: Path | str) -> None:
+def write_tracks(path: Path | str, frames: Iterable[Tracks]) -> None:
     """Write the confirmed tracks of an episode; the file is moved in when it is whole.
 
     Args:
-        frames: Of the episode, in order, from the first.
         path: The text file.
+        frames: Of the episode, in order, from the first.
+
+    Raises:
+        OSError: If it cannot be written.
     """
     with moved_in(Path(path)) as part, part.open("w", encoding="ascii", newline="\n") as file:
         for number, tracks in enumerate(frames, start=1):
@@ -32,7 +35,7 @@ def write(frames: Iterable[Tracks], path: Path | str) -> None:
                 file.write(f"{number},{tracks.ids[k]},{numbers},-1,-1,-1\n")
 
 
-def read(path: Path | str, *, frames: int | None = None) -> tuple[Tracks, ...]:
+def read_tracks(path: Path | str, *, frames: int | None = None) -> tuple[Tracks, ...]:
     """Read a MOTChallenge file; truth and tracks look alike.
 
     Args:

@@ -40,7 +40,7 @@ def tracks(rng: np.random.Generator, n: int, *, full: bool) -> Tracks:
     )
 
 
-def make_log(frames: int = 5, *, with_traces: bool = True) -> EpisodeLog:
+def make_log(frames: int = 5, *, with_traces: bool = True, with_depths: bool = False) -> EpisodeLog:
     rng = np.random.default_rng(3)
     traces = TraceLog(
         ticks=np.arange(4),
@@ -54,6 +54,7 @@ def make_log(frames: int = 5, *, with_traces: bool = True) -> EpisodeLog:
         vote_ids=np.array([1, 2]),
         vote_objects=np.array([0, 1 << 20], np.uint32),
         vote_counts=np.array([3, 4]),
+        vote_depths=np.array([np.inf, 20.0]) if with_depths else None,
     )
     return EpisodeLog(
         scenario="in-car-day",
@@ -99,6 +100,12 @@ def test_loading_gives_what_was_saved(tmp_path: Path, frames: int, with_traces: 
     assert [p.name for p in tmp_path.iterdir()] == ["log.npz"]
 
 
+def test_depths_are_kept(tmp_path: Path) -> None:
+    log = make_log(with_depths=True)
+    save(log, tmp_path / "log.npz")
+    assert same(load(tmp_path / "log.npz"), log)
+
+
 def test_the_same_log_gives_the_same_bytes(tmp_path: Path) -> None:
     save(make_log(), tmp_path / "a.npz")
     save(make_log(), tmp_path / "b.npz")
@@ -125,7 +132,7 @@ def test_a_missing_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "kind", ["empty", "text", "truncated", "flipped", "array", "other", "short", "format"]
+    "kind", ["empty", "text", "truncated", "flipped", "array", "other", "short", "traces", "format"]
 )
 def test_bad_files_give_one_clear_error(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "log.npz"
@@ -151,6 +158,8 @@ def test_bad_files_give_one_clear_error(tmp_path: Path, kind: str) -> None:
         np.savez(path, a=np.zeros(3))
     elif kind == "short":
         np.savez(path, **(arrays | {"truth/ids": arrays["truth/ids"][:-1]}))
+    elif kind == "traces":
+        np.savez(path, **{name: array for name, array in arrays.items() if name != "traces/x"})
     elif kind == "format":
         np.savez(path, **(arrays | {"plain": np.frombuffer(b'{"format": "other"}', np.uint8)}))
     with pytest.raises(ValueError, match="episode log") as caught:

@@ -18,13 +18,13 @@ def test_only_confirmed_tracks_frames_from_one_boxes_unshifted(tmp_path: Path) -
             status=np.array([Status.CONFIRMED, Status.COASTING], np.uint8),
         ),
     ]
-    mot.write(frames, tmp_path / "tracks.txt")
+    mot.write_tracks(tmp_path / "tracks.txt", frames)
     assert (tmp_path / "tracks.txt").read_text() == "2,4,0.0000,1.5000,10.0000,19.7500,1.0000,-1,-1,-1\n"
-    first, second, third = mot.read(tmp_path / "tracks.txt", frames=3)
+    first, second, third = mot.read_tracks(tmp_path / "tracks.txt", frames=3)
     assert len(first) == len(third) == 0
     assert second.ids.tolist() == [4]
     assert second.boxes.tolist() == [[0.0, 1.5, 10.0, 21.25]]
-    assert len(mot.read(tmp_path / "tracks.txt")) == 2
+    assert len(mot.read_tracks(tmp_path / "tracks.txt")) == 2
     assert [p.name for p in tmp_path.iterdir()] == ["tracks.txt"]
 
 
@@ -34,7 +34,7 @@ def test_a_failed_write_leaves_nothing(tmp_path: Path) -> None:
         raise RuntimeError("stopped")
 
     with pytest.raises(RuntimeError):
-        mot.write(frames(), tmp_path / "tracks.txt")  # type: ignore[arg-type]
+        mot.write_tracks(tmp_path / "tracks.txt", frames())  # type: ignore[arg-type]
     assert list(tmp_path.iterdir()) == []
 
 
@@ -54,12 +54,12 @@ def test_a_failed_write_leaves_nothing(tmp_path: Path) -> None:
 def test_bad_lines_are_named(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "tracks.txt").write_text(text)
     with pytest.raises(ValueError, match=message):
-        mot.read(tmp_path / "tracks.txt", frames=5)
+        mot.read_tracks(tmp_path / "tracks.txt", frames=5)
 
 
 def test_missing_and_binary_files(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="cannot be read"):
-        mot.read(tmp_path / "none.txt")
+        mot.read_tracks(tmp_path / "none.txt")
     (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ValueError, match="cannot be read"):
-        mot.read(tmp_path / "binary")
+        mot.read_tracks(tmp_path / "binary")

@@ -30,9 +30,11 @@ def sequence_of(case: dict[str, Any]) -> Sequence:
 
 
 def tud(name: str) -> Sequence:
-    truth, test = (mot.read(FIXTURES / "tud" / name / file) for file in ("gt.txt", "test.txt"))
+    truth, test = (mot.read_tracks(FIXTURES / "tud" / name / file) for file in ("gt.txt", "test.txt"))
     frames = max(len(truth), len(test))
-    truth, test = (mot.read(FIXTURES / "tud" / name / file, frames=frames) for file in ("gt.txt", "test.txt"))
+    truth, test = (
+        mot.read_tracks(FIXTURES / "tud" / name / file, frames=frames) for file in ("gt.txt", "test.txt")
+    )
     return Sequence.of(
         [t.ids for t in truth],
         [p.ids for p in test],

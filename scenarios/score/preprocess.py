@@ -1,0 +1,122 @@
+"""Which objects and which tracks are scored (scoring.md 1, 4, 5, 6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from scenarios.log import EpisodeLog
+from scenarios.score.params import Boxes, ScoringParams
+from scenarios.score.sequence import Sequence
+from sim.truth.types import FrameTruth
+from sim.world import Role
+from tracker.boxes import box_area, intersection, iou
+from tracker.types import Status, Tracks
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selection:
+    """What becomes of the N vehicles of a frame.
+
+    A vehicle is scored, or ignored (a box on it is neither right nor wrong), or background (a box on it is
+    false): a parked one, and one without a box in the frame.
+
+    Attributes:
+        boxes: (N, 4) in the frame, not a number where there is none.
+        scored: (N,).
+        ignored: (N,).
+    """
+
+    boxes: Floats
+    scored: Mask
+    ignored: Mask
+
+
+def select(
+    truth: FrameTruth, *, width: int, height: int, boxes: Boxes = "amodal", params: ScoringParams
+) -> Selection:
+    """Decide which vehicles of an in-car frame are scored, and by which boxes."""
+    chosen = truth.box_amodal if boxes == "amodal" else truth.box_visible
+    clipped = clip(chosen, width, height)
+    present = box_area(clipped) > 0
+    clipped = np.where(present[:, None], clipped, np.nan)
+    scored = (
+        present
+        & (truth.roles == Role.SAME_WAY)
+        & (truth.distances <= params.max_distance)
+        & (truth.visible >= params.min_visible)
+        & (clipped[:, 3] - clipped[:, 1] >= params.min_height)
+    )
+    return Selection(boxes=clipped, scored=scored, ignored=present & ~scored & (truth.roles != Role.PARKED))
+
+
+def clip(boxes: Floats, width: int, height: int) -> Floats:
+    """Cut boxes (N, 4) off at the frame's border; not a number stays what it is."""
+    return np.clip(boxes, 0.0, np.array([width, height, width, height], float))
+
+
+def kept_tracks(boxes: Floats, scored: Floats, ignored: Floats, params: ScoringParams) -> Mask:
+    """Tell which of a frame's P track boxes are scored: all but the unmatched ones on ignored vehicles.
+
+    Args:
+        boxes: (P, 4) of the tracks.
+        scored: (G, 4) of scored vehicles.
+        ignored: (I, 4) of ignored vehicles.
+        params: Thresholds.
+
+    Returns:
+        (P,) bool.
+    """
+    keep = np.ones(len(boxes), bool)
+    if not len(ignored) or not len(boxes):
+        return keep
+    overlap = iou(scored, boxes)
+    worth = np.where(overlap >= params.match_iou, overlap, 0.0)
+    rows, columns = linear_sum_assignment(worth, maximize=True)
+    matched = np.zeros(len(boxes), bool)
+    matched[columns[worth[rows, columns] > 0]] = True
+    for k in np.flatnonzero(~matched):
+        on_one = iou(boxes[k], ignored).max() >= params.ignore_iou
+        area = float(box_area(boxes[k]))
+        keep[k] = not (on_one or (area > 0 and covered_area(boxes[k], ignored) >= params.ignore_cover * area))
+    return keep
+
+
+def covered_area(box: Floats, others: Floats) -> float:
+    """Give the area of ``box`` (4,) that ``others`` (N, 4) cover together, px^2, counting nothing twice."""
+    inner = np.concatenate([np.maximum(others[:, :2], box[:2]), np.minimum(others[:, 2:], box[2:])], axis=1)
+    inner = inner[(intersection(box, others)[0] > 0)]
+    if not len(inner):
+        return 0.0
+    # Between neighbouring edges every cell is wholly inside or wholly outside each box.
+    x, y = np.unique(inner[:, [0, 2]]), np.unique(inner[:, [1, 3]])
+    in_x = (inner[:, None, 0] <= x[None, :-1]) & (x[None, 1:] <= inner[:, None, 2])
+    in_y = (inner[:, None, 1] <= y[None, :-1]) & (y[None, 1:] <= inner[:, None, 3])
+    covered = (in_y[:, :, None] & in_x[:, None, :]).any(axis=0)
+    return float(np.diff(y) @ covered @ np.diff(x))
+
+
+def confirmed(tracks: Tracks, width: int, height: int) -> tuple[NDArray[np.int64], Floats]:
+    """Give ids (P,) and boxes (P, 4), cut off at the frame's border, of the confirmed tracks."""
+    chosen = tracks.status == Status.CONFIRMED
+    return tracks.ids[chosen], clip(tracks.boxes[chosen], width, height)
+
+
+def box_sequence(log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams) -> Sequence:
+    """Turn an episode into what CLEAR, identity and HOTA are computed from."""
+    truth_ids, track_ids, similarities = [], [], []
+    for truth, tracks in zip(log.truth, log.tracks, strict=True):
+        selection = select(truth, width=log.width, height=log.height, boxes=boxes, params=params)
+        scored = selection.boxes[selection.scored]
+        ids, found = confirmed(tracks, log.width, log.height)
+        keep = kept_tracks(found, scored, selection.boxes[selection.ignored], params)
+        truth_ids.append(truth.ids[selection.scored])
+        track_ids.append(ids[keep])
+        similarities.append(iou(scored, found[keep]))
+    return Sequence.of(truth_ids, track_ids, similarities)

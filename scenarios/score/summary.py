@@ -1,0 +1,68 @@
+"""All scores of one episode, from its log."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from scenarios.log import EpisodeLog
+from scenarios.score.clear import clear
+from scenarios.score.difficulty import difficulty
+from scenarios.score.hota import hota
+from scenarios.score.identification import identification, judge_traces
+from scenarios.score.identity import identity
+from scenarios.score.params import Boxes, ScoringParams
+from scenarios.score.preprocess import box_sequence
+
+DEFAULTS = ScoringParams()
+
+
+def score(
+    log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams = DEFAULTS
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Score one tracker on one in-car episode.
+
+    Args:
+        log: The episode.
+        boxes: Which truth is scored.
+        params: Thresholds.
+
+    Returns:
+        The scores and the difficulty, as they are printed: fractions, seconds and counts as plain numbers,
+        and None where what a score is computed from is missing.
+    """
+    traces = judge_traces(log, params)
+    scores = {
+        **box_scores(log, boxes=boxes, params=params),
+        "identification": identification(log, traces, boxes=boxes, params=params),
+    }
+    return scores, difficulty(log, traces, boxes=boxes, params=params)
+
+
+def box_scores(
+    log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams = DEFAULTS
+) -> dict[str, float | int | None]:
+    """Compute HOTA, CLEAR and identity.
+
+    All are null for a tracker without boxes; all but the precision where there is nothing to be tracked, and
+    the precision where nothing was claimed.
+    """
+    names = ("hota", "deta", "assa", "mota", "idf1", "id_switches", "precision", "recall")
+    scores: dict[str, float | int | None] = dict.fromkeys(names)
+    if not log.has_boxes:
+        return scores
+    sequence = box_sequence(log, boxes=boxes, params=params)
+    by_frame = clear(sequence, threshold=params.match_iou)
+    if sequence.track_boxes:
+        scores["precision"] = by_frame.precision
+    if sequence.truth_boxes:
+        overall = hota(sequence)
+        scores |= {
+            "hota": float(overall.hota.mean()),
+            "deta": float(overall.deta.mean()),
+            "assa": float(overall.assa.mean()),
+            "mota": by_frame.mota,
+            "idf1": identity(sequence, threshold=params.match_iou).idf1,
+            "id_switches": by_frame.id_switches,
+            "recall": by_frame.recall,
+        }
+    return scores
