@@ -123,16 +123,13 @@ def find_lamps(grey: NDArray[np.uint8], night: float, *, contrast: float = 30.0,
 
 
 @njit(cache=True)
-def _select(response, least, fine, coarse, row_fine_from, row_fine_to, taken, limit):  # type: ignore[no-untyped-def]
+def _select(response, least, cell, taken, limit):  # type: ignore[no-untyped-def]
     height, width = response.shape
     places = np.empty((limit, 2), np.float32)
     used = 0
-    row = 0
-    while row < height:
-        cell = fine if row_fine_from <= row < row_fine_to else coarse
+    for row in range(0, height, cell):
         lower = min(row + cell, height)
-        column = 0
-        while column < width:
+        for column in range(0, width, cell):
             right = min(column + cell, width)
             best, best_i, best_j, free = least, -1, -1, True
             for i in range(row, lower):
@@ -149,40 +146,70 @@ def _select(response, least, fine, coarse, row_fine_from, row_fine_to, taken, li
                 places[used, 0] = best_j
                 places[used, 1] = best_i
                 used += 1
-            column = right
-        row = lower
     return places[:used]
 
 
 def find_corners(
-    grey: NDArray[np.uint8],
-    taken: NDArray[np.uint8],
-    fine_rows: tuple[int, int],
-    *,
-    least: float = 4e-4,
-    fine: int = 6,
-    coarse: int = 16,
-    limit: int = 400,
+    response: NDArray[np.float32], taken: NDArray[np.uint8], cell: int, least: float, limit: int
 ) -> NDArray[np.float32]:
-    """Find corners, the best one of each free cell of a grid.
-
-    The smaller eigenvalue of the structure tensor counts: along an edge that points at the focus of expansion a point seems to
-    stand still like a car, so an edge alone is no feature.
+    """Find corners: the best one of each free cell of a grid.
 
     Args:
-        grey: (H, W).
-        taken: (H, W), non-zero at points that are tracked already; their cells get no new point.
-        fine_rows: Rows with the fine grid, where far vehicles lie.
-        least: Least eigenvalue, in cv2's units for pictures scaled to [0, 1].
-        fine: Cell of the fine grid, px.
-        coarse: Cell elsewhere, px.
+        response: (H, W) smaller eigenvalue of the structure tensor (`corner_response`).
+        taken: (H, W), non-zero at points that are followed already; their cells get no new point.
+        cell: Side of a cell, px.
+        least: Least response.
         limit: Corners returned at most.
 
     Returns:
-        (N, 2) float32 x, y with pixel centres at integers, as cv2's optical flow wants them.
+        (N, 2) float32 column, row, in reading order of the cells.
     """
-    response = cv2.cornerMinEigenVal(grey, 3, ksize=3)
-    found: NDArray[np.float32] = _select(
-        response, least, fine, coarse, fine_rows[0], fine_rows[1], taken, limit
-    )
+    found: NDArray[np.float32] = _select(response, least, cell, taken, limit)
+    return found
+
+
+def corner_response(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return the smaller eigenvalue of the structure tensor (H, W), in cv2's units."""
+    return np.asarray(cv2.cornerMinEigenVal(grey, 3, ksize=3), np.float32)
+
+
+@njit(cache=True)
+def _stiffness(grey, x, y, ux, uy, radius):  # type: ignore[no-untyped-def]
+    height, width = grey.shape
+    trust = np.zeros(x.size)
+    for k in range(x.size):
+        column, row = int(x[k]), int(y[k])
+        xx = yy = xy = 0.0
+        for i in range(max(row - radius, 1), min(row + radius + 1, height - 1)):
+            for j in range(max(column - radius, 1), min(column + radius + 1, width - 1)):
+                gx = 0.5 * (float(grey[i, j + 1]) - float(grey[i, j - 1]))
+                gy = 0.5 * (float(grey[i + 1, j]) - float(grey[i - 1, j]))
+                xx += gx * gx
+                yy += gy * gy
+                xy += gx * gy
+        determinant = xx * yy - xy * xy
+        top = 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
+        weak = ux[k] * ux[k] * yy + uy[k] * uy[k] * xx - 2.0 * ux[k] * uy[k] * xy
+        if weak > 1e-9 and top > 1e-9:
+            trust[k] = determinant / weak / top
+    return trust
+
+
+def stiffness(grey: NDArray[np.uint8], position: Floats, direction: Floats, radius: int = 5) -> Floats:
+    """Tell how well the picture around a point fixes its motion along a direction.
+
+    Along an edge that points at the focus of expansion a point seems to stand still like a car, whatever it does.
+
+    Args:
+        grey: (H, W).
+        position: (N, 2) px.
+        direction: (N, 2) unit vectors u.
+        radius: Half of the window.
+
+    Returns:
+        (N,) in [0, 1]: 1 / (u A^-1 u) over the larger eigenvalue of A, A the structure tensor of the window.
+    """
+    x, y = np.ascontiguousarray(position.T)
+    ux, uy = np.ascontiguousarray(direction.T)
+    found: Floats = _stiffness(grey, x, y, ux, uy, radius)
     return found

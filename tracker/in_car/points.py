@@ -1,0 +1,150 @@
+"""Corner points followed from frame to frame by optical flow, and their recent past."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.in_car.features import corner_response, find_corners
+
+Floats = NDArray[np.float64]
+
+WINDOW = (11, 11)
+LEVELS = 2
+
+
+class PointStore:
+    """Follows corners. Working px, pixel centres at +0.5.
+
+    Attributes:
+        ids: (N,) int64, never used again.
+        position: (N, 2).
+        flow: (N, 2) of the last frame, px; zero for a new point.
+        age: (N,) frames since the point was found.
+        evidence: (N,) log odds that the point is on a vehicle that goes the ego's way.
+        owner: (N,) id of the vehicle that the point moves with, 0 for none.
+    """
+
+    def __init__(self, *, memory: int) -> None:
+        """Start empty.
+
+        Args:
+            memory: Frames of past positions that are kept.
+        """
+        self._memory = memory
+        self._last: NDArray[np.uint8] | None = None
+        self._next_id = 1
+        self.ids = np.zeros(0, np.int64)
+        self.position = np.zeros((0, 2))
+        self.flow = np.zeros((0, 2))
+        self.age = np.zeros(0, np.int64)
+        self.evidence = np.zeros(0)
+        self.owner = np.zeros(0, np.int64)
+        self._past = np.zeros((0, memory, 2))
+        self._turned = np.zeros((0, memory, 2))
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def follow(self, grey: NDArray[np.uint8], *, residual: float = 18.0) -> None:
+        """Follow the points into the next picture; those that are lost are dropped.
+
+        Args:
+            grey: (h, w).
+            residual: Greatest mean difference of the two windows, grey levels.
+        """
+        if len(self) and self._last is not None:
+            start = (self.position - 0.5).astype(np.float32)[:, None]
+            guess = start + self.flow.astype(np.float32)[:, None]
+            moved, found, error = cv2.calcOpticalFlowPyrLK(
+                self._last,
+                grey,
+                start,
+                guess,
+                winSize=WINDOW,
+                maxLevel=LEVELS,
+                criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 10, 0.02),
+                flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+                minEigThreshold=1e-4,
+            )
+            place = moved[:, 0].astype(np.float64) + 0.5
+            height, width = grey.shape
+            inside = (place > 3.0).all(1) & (place[:, 0] < width - 3.0) & (place[:, 1] < height - 3.0)
+            good = (found[:, 0] == 1) & inside & (error[:, 0] < residual)
+            # A flow that jumps is a window that slipped onto something else.
+            change = np.abs(place - self.position - self.flow).max(1)
+            good &= (self.age < 1) | (change < 3.0 + 0.3 * np.abs(self.flow).max(1))
+            self.flow = place - self.position
+            self.position = place
+            self._keep(good)
+            self.age += 1
+        self._last = grey
+
+    def remember(self, turned: Floats) -> None:
+        """Store the positions of this frame, with the flow that the camera's rotation caused since the last one (N, 2)."""
+        total = self._turned[:, -1] + turned
+        self._past = np.roll(self._past, -1, axis=1)
+        self._turned = np.roll(self._turned, -1, axis=1)
+        self._past[:, -1] = self.position
+        self._turned[:, -1] = total
+
+    def displacement(self) -> tuple[Floats, Floats]:
+        """Return how far each point moved over its remembered past, rotation removed (N, 2), and in how many frames (N,)."""
+        span = np.minimum(self.age, self._memory - 1)
+        rows = np.arange(len(self))
+        then = self._memory - 1 - span
+        moved = self._past[:, -1] - self._past[rows, then]
+        turned = self._turned[:, -1] - self._turned[rows, then]
+        return moved - turned, span.astype(float)
+
+    def refill(self, grey: NDArray[np.uint8], horizon: float) -> None:
+        """Add corners where there are none: sparsely above the horizon, densely where far vehicles lie, then the road."""
+        height, width = grey.shape
+        top = int(np.clip(horizon - 0.13 * width, 0, height - 24))
+        near = int(np.clip(horizon - 0.025 * width, top + 8, height - 16))
+        road = int(np.clip(horizon + 0.09 * width, near + 8, height - 8))
+        bottom = int(np.clip(horizon + 0.30 * width, road + 8, height))
+        response = corner_response(grey[top:bottom])
+        taken = np.zeros(response.shape, np.uint8)
+        columns = np.clip(self.position[:, 0].astype(np.int64), 0, width - 1)
+        rows = self.position[:, 1].astype(np.int64) - top
+        inside = (rows >= 0) & (rows < len(taken))
+        taken[rows[inside], columns[inside]] = 1
+        for first, last, cell, least, quota in (
+            (top, near, 24, 4e-4, 70),
+            (near, road, 7, 2e-4, 220),
+            (road, bottom, 18, 1e-4, 120),
+        ):
+            held = int(((self.position[:, 1] >= first) & (self.position[:, 1] < last)).sum())
+            if held >= quota:
+                continue
+            part = slice(first - top, last - top)
+            corners = find_corners(response[part], taken[part], cell, least, 4 * quota)
+            if held + len(corners) > quota:
+                # The strongest of those there is room for.
+                strength = response[part][corners[:, 1].astype(np.int64), corners[:, 0].astype(np.int64)]
+                corners = corners[np.sort(np.argsort(-strength, kind="stable")[: quota - held])]
+            self._add(corners.astype(np.float64) + np.array([0.5, 0.5 + first]))
+
+    def drop(self, gone: NDArray[np.bool_]) -> None:
+        """Give up points (N,)."""
+        self._keep(~gone)
+
+    def _add(self, places: Floats) -> None:
+        count = len(places)
+        self.ids = np.concatenate([self.ids, self._next_id + np.arange(count)])
+        self._next_id += count
+        self.position = np.concatenate([self.position, places])
+        self.flow = np.concatenate([self.flow, np.zeros((count, 2))])
+        self.age = np.concatenate([self.age, np.zeros(count, np.int64)])
+        self.evidence = np.concatenate([self.evidence, np.zeros(count)])
+        self.owner = np.concatenate([self.owner, np.zeros(count, np.int64)])
+        past = np.repeat(places[:, None], self._memory, 1)
+        self._past = np.concatenate([self._past, past])
+        self._turned = np.concatenate([self._turned, np.zeros_like(past)])
+
+    def _keep(self, chosen: NDArray[np.bool_]) -> None:
+        self.ids, self.position, self.flow = self.ids[chosen], self.position[chosen], self.flow[chosen]
+        self.age, self.evidence, self.owner = self.age[chosen], self.evidence[chosen], self.owner[chosen]
+        self._past, self._turned = self._past[chosen], self._turned[chosen]

@@ -1,0 +1,260 @@
+"""The vehicles that are tracked: a box each, carried along by the points on it and held by the picture's edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.in_car.extent import fit_extent
+from tracker.in_car.points import PointStore
+from tracker.in_car.proposals import SLIMMEST, WIDEST, propose, windows_from_points, windows_from_segments
+from tracker.types import Status
+
+Floats = NDArray[np.float64]
+
+# Log odds at which a vehicle is confirmed, and below which it is given up.
+CONFIRM, REJECT = 2.5, -1.5
+# Bounds of the log odds: old evidence must not outlast new evidence for too long.
+LOWEST, HIGHEST = -6.0, 8.0
+# Seconds over which the points' evidence is worth once itself: the span of the displacements.
+CORRELATION = 0.35
+
+
+@dataclass(slots=True, kw_only=True)
+class Vehicle:
+    """One tracked vehicle; working px, seconds."""
+
+    id: int
+    box: Floats
+    velocity: Floats = field(default_factory=lambda: np.zeros(2))
+    growth: float = 0.0
+    odds: float = 0.0
+    age: int = 0
+    missed: int = 0
+    members: int = 0
+    confirmed: bool = False
+    clear: float = 0.0
+
+    @property
+    def status(self) -> Status:
+        """How sure it is in this frame."""
+        if not self.confirmed:
+            return Status.TENTATIVE
+        return Status.COASTING if self.missed > 0 else Status.CONFIRMED
+
+
+class VehicleStore:
+    """Keeps the vehicles of an episode."""
+
+    def __init__(self, *, rate: float) -> None:
+        """Start without vehicles."""
+        self._rate = rate
+        self._next_id = 1
+        self.vehicles: list[Vehicle] = []
+
+    def step(
+        self,
+        grey: NDArray[np.uint8],
+        points: PointStore,
+        ratios: Floats,
+        trust: Floats,
+        segments: Floats,
+        horizon: float,
+        farthest: float,
+    ) -> None:
+        """Advance by one frame.
+
+        Args:
+            grey: (h, w).
+            points: Followed into this frame; their owners are updated.
+            ratios: (N,) log likelihood ratio of each point's motion.
+            trust: (N,) in [0, 1], how far the picture fixes it.
+            segments: (M, 6) horizontal segments.
+            horizon: Row, px.
+            farthest: Least height of the horizon above a contact row, px: beyond that no vehicle is begun.
+        """
+        for vehicle in self.vehicles:
+            self._carry(vehicle, points)
+            self._weigh(vehicle, points, ratios, trust)
+            self._hold(vehicle, grey, points, horizon)
+        self._end(grey, points, horizon)
+        self._join(points, ratios)
+        self._begin(grey, points, segments, horizon, farthest)
+
+    def _carry(self, vehicle: Vehicle, points: PointStore) -> None:
+        """Move the box with its points."""
+        own = np.flatnonzero((points.owner == vehicle.id) & (points.age >= 1))
+        box = vehicle.box
+        vehicle.age += 1
+        if len(own) >= 1:
+            flow = points.flow[own]
+            shift = np.median(flow, axis=0)
+            away = points.position[own] - np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])]) - shift
+            expected = shift + vehicle.growth * away
+            off = np.abs(flow - expected).max(1)
+            bad = off > 1.2 + 0.03 * (box[2] - box[0])
+            points.owner[own[bad]] = 0
+            own, flow, away = own[~bad], flow[~bad], away[~bad]
+        vehicle.members = len(own)
+        if len(own) >= 1:
+            shift = np.median(flow, axis=0)
+            if len(own) >= 3:
+                centred = away - away.mean(0)
+                power = float((centred * centred).sum())
+                scale = float((centred * (flow - flow.mean(0))).sum()) / max(power, 30.0)
+                trust = power / (power + 150.0)
+                vehicle.growth += 0.3 * trust * (float(np.clip(scale, -0.05, 0.05)) - vehicle.growth)
+            middle_shift = shift - vehicle.growth * np.median(away, axis=0)
+            vehicle.velocity += 0.3 * (middle_shift - vehicle.velocity)
+            vehicle.missed = 0
+        else:
+            middle_shift = vehicle.velocity
+            vehicle.growth *= 0.95
+            vehicle.missed += 1
+        middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])]) + middle_shift
+        half = 0.5 * np.array([box[2] - box[0], box[3] - box[1]]) * (1.0 + vehicle.growth)
+        vehicle.box = np.concatenate([middle - half, middle + half])
+
+    def _weigh(self, vehicle: Vehicle, points: PointStore, ratios: Floats, trust: Floats) -> None:
+        """Add this frame's evidence, once per correlation time."""
+        own = (points.owner == vehicle.id) & (points.age >= 4)
+        worth = float(trust[own].sum())
+        if worth > 0.3:
+            mean = float((np.clip(ratios[own], -4.0, 4.0) * trust[own]).sum()) / worth
+            gain = mean * min(worth, 4.0) / 2.0 / (self._rate * CORRELATION)
+            vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
+        if vehicle.odds > CONFIRM and vehicle.age >= 0.2 * self._rate and vehicle.members >= 2:
+            vehicle.confirmed = True
+
+    def _hold(self, vehicle: Vehicle, grey: NDArray[np.uint8], points: PointStore, horizon: float) -> None:
+        """Pull the box to the edges of the picture."""
+        own = points.owner == vehicle.id
+        box = vehicle.box
+        roof = float(points.position[own, 1].min()) if own.any() else float(box[1])
+        young = vehicle.age < 0.5 * self._rate
+        found = fit_extent(grey, box, loose=0.15 if young else 0.08, roof=roof)
+        wide, contact = found.box[2] - found.box[0], found.box[3] - horizon
+        clear = min(found.sides, 1.5) + 0.5 * min(max(found.foot, 0.0), 1.5)
+        vehicle.clear += 0.1 * (clear - vehicle.clear)
+        if contact <= 2.0 or not SLIMMEST * contact < wide < WIDEST * contact:
+            return
+        gain = (0.3 if young else 0.12) * min(clear / 1.2, 1.0)
+        vehicle.box = box + gain * (found.box - box)
+
+    def _end(self, grey: NDArray[np.uint8], points: PointStore, horizon: float) -> None:
+        height, width = grey.shape
+        patience = 0.5 * self._rate
+        kept: list[Vehicle] = []
+        for vehicle in sorted(self.vehicles, key=lambda one: (not one.confirmed, -one.odds)):
+            box = vehicle.box
+            wide, tall = box[2] - box[0], box[3] - box[1]
+            seen = max(min(box[2], width) - max(box[0], 0.0), 0.0) * max(
+                min(box[3], height) - max(box[1], 0.0), 0.0
+            )
+            gone = (
+                vehicle.odds < REJECT
+                or vehicle.missed > (patience if vehicle.confirmed else 3)
+                or seen < 0.25 * wide * tall
+                or tall < 6.0
+                or box[3] < horizon + 4.0
+                or (not vehicle.confirmed and vehicle.age > 2.0 * self._rate and vehicle.odds < 0.5)
+                or any(_covered(box, other.box) > 0.55 for other in kept)
+            )
+            if gone:
+                points.owner[points.owner == vehicle.id] = 0
+            else:
+                kept.append(vehicle)
+        self.vehicles = sorted(kept, key=lambda one: one.id)
+
+    def _join(self, points: PointStore, ratios: Floats) -> None:
+        """Give new points on a vehicle to it, and take back those that lie outside."""
+        x, y = points.position.T
+        for vehicle in self.vehicles:
+            box = vehicle.box
+            wide, tall = box[2] - box[0], box[3] - box[1]
+            own = points.owner == vehicle.id
+            far = (x < box[0] - 0.12 * wide) | (x > box[2] + 0.12 * wide)
+            far |= (y < box[1] - 0.25 * tall) | (y > box[3] + 0.08 * tall)
+            points.owner[own & far] = 0
+            inside = (x > box[0] - 0.02 * wide) & (x < box[2] + 0.02 * wide)
+            inside &= (y > box[1] - 0.1 * tall) & (y < box[3] + 0.02 * tall)
+            middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])])
+            expected = vehicle.velocity + vehicle.growth * (points.position - middle)
+            along = np.abs(points.flow - expected).max(1) < 0.7 + 0.01 * wide
+            fresh = inside & along & (points.owner == 0) & (points.age >= 2) & (ratios > -1.5)
+            points.owner[fresh] = vehicle.id
+
+    def _begin(
+        self, grey: NDArray[np.uint8], points: PointStore, segments: Floats, horizon: float, farthest: float
+    ) -> None:
+        free = (points.owner == 0) & (points.age >= 4)
+        likely = free & (points.evidence > 1.0)
+        if likely.sum() < 2:
+            return
+        position = points.position
+        windows = np.concatenate(
+            [
+                windows_from_points(position[likely, 0], position[likely, 1], horizon),
+                windows_from_segments(segments, horizon),
+            ]
+        )
+        windows = windows[windows[:, 3] - horizon >= farthest]
+        for window in propose(windows, position[free], points.evidence[free], horizon, least=4.0):
+            self._try(window, grey, points, free, horizon, farthest)
+
+    def _try(
+        self,
+        window: Floats,
+        grey: NDArray[np.uint8],
+        points: PointStore,
+        free: NDArray[np.bool_],
+        horizon: float,
+        farthest: float,
+    ) -> None:
+        inside = _inside(points.position, window, 0.05) & free & (points.evidence > 0.5)
+        roof = float(points.position[inside, 1].min()) if inside.any() else float(window[1])
+        found = fit_extent(grey, window, loose=0.3, roof=roof)
+        box = found.box
+        wide, contact = box[2] - box[0], box[3] - horizon
+        if contact < farthest or not SLIMMEST * contact < wide < WIDEST * contact:
+            return
+        if found.sides < 0.5:
+            return
+        if any(_covered(box, other.box) > 0.35 for other in self.vehicles):
+            return
+        members = _inside(points.position, box, 0.05) & free
+        good = members & (points.evidence > 0.5)
+        if good.sum() < 2 or (members & (points.evidence < -0.8)).sum() > 0.5 * good.sum():
+            return
+        vehicle = Vehicle(id=self._next_id, box=box)
+        self._next_id += 1
+        flow = points.flow[good]
+        vehicle.velocity = np.median(flow, axis=0)
+        vehicle.odds = 0.0
+        vehicle.members = int(good.sum())
+        points.owner[good] = vehicle.id
+        self.vehicles.append(vehicle)
+
+
+def _inside(position: Floats, box: Floats, play: float) -> NDArray[np.bool_]:
+    wide, tall = box[2] - box[0], box[3] - box[1]
+    x, y = position.T
+    result: NDArray[np.bool_] = (
+        (x > box[0] - play * wide)
+        & (x < box[2] + play * wide)
+        & (y > box[1] - play * tall)
+        & (y < box[3] + play * tall)
+    )
+    return result
+
+
+def _covered(box: Floats, other: Floats) -> float:
+    """Return the shared area over the smaller box's area."""
+    wide = min(box[2], other[2]) - max(box[0], other[0])
+    tall = min(box[3], other[3]) - max(box[1], other[1])
+    if wide <= 0 or tall <= 0:
+        return 0.0
+    smaller = min((box[2] - box[0]) * (box[3] - box[1]), (other[2] - other[0]) * (other[3] - other[1]))
+    return float(wide * tall / max(smaller, 1e-9))
