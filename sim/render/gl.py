@@ -14,6 +14,7 @@ from sim.render.antialias import smooth_edges
 from sim.render.context import check, context
 from sim.render.ground import MARGIN, cut, grain_texture, road_texture
 from sim.render.instances import COMMAND, INSTANCE, Library, in_bands
+from sim.render.lamps import HALO, LIGHTS, Burning, LampPlan, halos, lights
 from sim.render.programs import program, set_uniforms
 from sim.render.silhouettes import SilhouettePass
 from sim.render.sky import HIGHEST, panorama
@@ -25,18 +26,19 @@ from sim.world import Bodies, WorldState
 _ROOM = 8192  # instances and draws in a frame
 
 _LINE_WIDTH = 0.15
-_GLOSS = {  # share of the body's colour (2: by the texture's alpha), least reflection, more of it by the alpha, glow
-    Surface.PAINT: (1.0, 0.06, 0.02, 0.0),
+_BEAM = 420.0
+_GLOSS = {  # share of the body's colour (2: by the texture's alpha), least reflection, by the alpha, retro-reflection
+    Surface.PAINT: (1.0, 0.055, 0.02, 0.0),
     Surface.GLASS: (0.0, 0.22, 0.0, 0.0),
     Surface.CHROME: (0.0, 0.45, 0.0, 0.0),
     Surface.RUBBER: (0.0, 0.0, 0.0, 0.0),
     Surface.PLASTIC: (0.0, 0.02, 0.0, 0.0),
-    Surface.PLATE: (0.0, 0.02, 0.0, 0.0),
-    Surface.TAIL_LAMP: (0.0, 0.05, 0.0, 1.0),
-    Surface.HEAD_LAMP: (0.0, 0.12, 0.0, 2.0),
+    Surface.PLATE: (0.0, 0.02, 0.0, 6.0),
+    Surface.TAIL_LAMP: (0.0, 0.05, 0.0, 3.0),
+    Surface.HEAD_LAMP: (0.0, 0.12, 0.0, 3.0),
     Surface.CARGO: (1.0, 0.01, 0.0, 0.0),
     Surface.FACADE: (0.0, 0.0, 0.25, 0.0),
-    Surface.SIGN: (2.0, 0.01, 0.0, 0.0),
+    Surface.SIGN: (2.0, 0.01, 0.0, 25.0),
 }
 
 
@@ -60,6 +62,8 @@ class GlRenderer:
         self._size = (camera.width, camera.height)
         self._library = Library(stage.models)
         self._ground = cut(stage.ground)
+        self._lamps = LampPlan(stage.models)
+        self._streets = stage.light.night
         self._things: list[Any] = []
         with context() as ctx:
             self._make_buffers(ctx)
@@ -101,6 +105,8 @@ class GlRenderer:
         commands = self._library.commands(selection.meshes)
         stretches = self._ground.select(camera, pose)
         view = view_matrices(camera, pose)
+        burning = self._lamps.burning(bodies, camera, pose, streets=self._streets)
+        glare = halos(burning, camera, night=self._stage.light.night)[:_ROOM]
         with context() as ctx:
             self._instances.write(instances)
             self._commands.write(commands)
@@ -108,8 +114,10 @@ class GlRenderer:
             self._ground_commands.write(self._ground.commands(stretches))
             draws = (len(commands), len(stretches))
             self._shadow_pass(ctx, view, draws, pose)
+            self._light_up(burning, pose)
             self._main_pass(ctx, view, draws)
             self._sky_pass(ctx, camera, pose)
+            self._halo_pass(ctx, view, glare)
             rgba, ids, depth = self._read()
             check(ctx, "rendering")
         return Picture(colour=smooth_edges(rgba), ids=ids, depth=depth)
@@ -158,6 +166,34 @@ class GlRenderer:
         self._sky_array.render(vertices=3)
         ctx.depth_func = "<"
 
+    def _light_up(self, burning: Burning, pose: Pose) -> None:
+        """Set what lamps light at night; the shaders of the day do not have it."""
+        shining = lights(burning)
+        ahead = pose.rotation[2] * [1, 1, 0]
+        ahead /= np.sqrt(ahead @ ahead)
+        for shader in (self._body, self._terrain):
+            set_uniforms(
+                shader,
+                u_lamps=LIGHTS,
+                u_lamp_at=shining.position.tobytes(),
+                u_lamp_colour=shining.colour.tobytes(),
+                u_lamp_aim=shining.aim.tobytes(),
+                u_ahead=tuple(ahead),
+                u_right=(ahead[1], -ahead[0], 0.0),
+            )
+
+    def _halo_pass(self, ctx: Any, view: dict[str, Any], glare: NDArray[np.void]) -> None:
+        if not len(glare):
+            return
+        self._halos.write(glare)
+        ctx.enable_only(ctx.DEPTH_TEST | ctx.BLEND)
+        ctx.blend_func = ctx.ONE, ctx.ONE
+        self._over.depth_mask = False
+        width, height = self._size
+        set_uniforms(self._halo, **view, u_pixel=(2 / width, 2 / height))
+        self._halo_array.render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(glare))
+        self._over.depth_mask = True
+
     def _read(self) -> tuple[NDArray[np.uint8], NDArray[np.uint32], NDArray[np.float32]]:
         width, height = self._size
         ids = np.frombuffer(self._target.read(components=1, attachment=1, dtype="u4"), np.uint32)
@@ -183,6 +219,7 @@ class GlRenderer:
         self._faces = keep(ctx.buffer(self._library.faces.tobytes()))
         self._instances = keep(ctx.buffer(reserve=_ROOM * INSTANCE.itemsize, dynamic=True))
         self._commands = keep(ctx.buffer(reserve=_ROOM * COMMAND.itemsize, dynamic=True))
+        self._halos = keep(ctx.buffer(reserve=_ROOM * HALO.itemsize, dynamic=True))
         chunks = len(self._ground.first)
         self._ground_vertices = keep(ctx.buffer(self._ground.vertices.tobytes()))
         self._ground_faces = keep(ctx.buffer(self._ground.faces.tobytes()))
@@ -224,12 +261,14 @@ class GlRenderer:
 
     def _make_programs(self, ctx: Any) -> None:
         keep, stage, light = self._keep, self._stage, self._stage.light
+        night = ("NIGHT",) if light.night else ()
+        shared = ("light", "lamps") if light.night else ("light",)
         self._body_shadow = keep(program(ctx, "body", "mask", "SHADOW"))
         self._body_shadow_array = self._bodies(ctx, self._body_shadow, "3f 24x", "3f 2f 3f 8x/i")
         self._alone = keep(program(ctx, "body", "alone", "ALONE"))
         alone = self._bodies(ctx, self._alone, "3f 24x", "3f 2f 3f 4x 1u/i", "i_id")
         self._silhouettes = keep(SilhouettePass(ctx, alone, self._instances, self._commands, self._size))
-        self._body = keep(program(ctx, "body", "body", "COLOUR", shared=("light",)))
+        self._body = keep(program(ctx, "body", "body", "COLOUR", *night, shared=shared))
         self._body_array = keep(
             ctx.vertex_array(
                 self._body,
@@ -248,7 +287,7 @@ class GlRenderer:
                 self._faces,
             )
         )
-        self._terrain = keep(program(ctx, "ground", "ground", shared=("light",)))
+        self._terrain = keep(program(ctx, "ground", "ground", *night, shared=shared))
         self._terrain_array = keep(
             ctx.vertex_array(
                 self._terrain,
@@ -263,7 +302,7 @@ class GlRenderer:
         self._sky_array = keep(ctx.vertex_array(self._sky, []))
         lit = {
             "u_sun": tuple(light.sun),
-            "u_sun_colour": tuple(light.sun_colour),
+            "u_sun_colour": tuple(light.sun_colour / np.pi),  # what a white surface that faces it sends back
             "u_zenith": tuple(light.zenith),
             "u_horizon": tuple(light.horizon),
             "u_haze": light.haze,
@@ -281,8 +320,22 @@ class GlRenderer:
             u_lines=len(lines),
             u_paved=stage.ground.paved,
             u_margin=MARGIN,
+            u_wet=light.wet,
         )
         set_uniforms(self._sky, u_highest=HIGHEST)
+        for shader in (self._body, self._terrain):
+            set_uniforms(shader, u_beam=_BEAM, u_street=float(self._streets))
+        self._halo = keep(program(ctx, "halo", "halo"))
+        self._corners = keep(ctx.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], "<f4").tobytes()))
+        self._halo_array = keep(
+            ctx.vertex_array(
+                self._halo,
+                [
+                    (self._corners, "2f", "in_corner"),
+                    (self._halos, "3f 1f 3f/i", "i_position", "i_radius", "i_colour"),
+                ],
+            )
+        )
 
     def _bodies(self, ctx: Any, shader: Any, vertex: str, instance: str, *more: str) -> Any:
         return self._keep(

@@ -1,7 +1,7 @@
 // Lit, textured bodies. One formula for all surfaces; a table says how each behaves.
 uniform sampler2DArray u_textures;
-uniform vec4 u_material[20];  // share of the body's colour, least reflection, reflection by the texture's alpha, glow
-uniform float u_lit;
+uniform vec4 u_material[20];  // share of the body's colour, least reflection, more of it by the alpha, retro-reflection
+uniform float u_street;
 in vec3 v_at;
 in vec3 v_normal;
 in vec3 v_uv;
@@ -12,6 +12,27 @@ in float v_depth;
 layout(location = 0) out vec4 o_colour;
 layout(location = 1) out uint o_id;
 layout(location = 2) out float o_depth;
+
+#define TAIL_LAMP 6
+#define HEAD_LAMP 7
+#define FACADE 13
+#define STREET_LAMP 16
+
+// What a face sends out by itself.
+vec3 glow(int surface, vec3 plain, float alpha) {
+    int lamps = int(v_colour.a * 255.0 + 0.5);
+    float tail = (lamps & 2) != 0 ? 2.2 : ((lamps & 1) != 0 && v_uv.x < 2.0 ? 0.7 : 0.0);
+    vec3 sum = surface == TAIL_LAMP ? tail * vec3(1.0, 0.06, 0.04) : vec3(0.0);
+    sum += surface == HEAD_LAMP && (lamps & 4) != 0 ? vec3(3.0, 2.9, 2.6) : vec3(0.0);
+#ifdef NIGHT
+    sum += surface == STREET_LAMP ? u_street * vec3(3.0, 2.4, 1.5) : vec3(0.0);
+    vec2 pane = floor(v_uv.xy * 4.0);
+    float dice = fract(sin(dot(pane, vec2(12.99, 78.23)) + float(v_id % 977u)) * 43758.5);
+    float lit = step(0.80, dice) * (0.25 + 2.0 * (dice - 0.8)) * alpha;
+    sum += surface == FACADE ? lit * vec3(0.75, 0.52, 0.26) : vec3(0.0);
+#endif
+    return sum;
+}
 
 void main() {
     int surface = int(v_uv.z + 0.5);
@@ -24,19 +45,22 @@ void main() {
     vec3 view = v_at / distance;
     vec3 normal = normalize(v_normal);
     float facing = max(-dot(view, normal), 0.0);
-    float sun = max(dot(normal, u_sun), 0.0);
     float up = 0.5 + 0.5 * normal.z;
     float shade = clamp(0.45 + 0.7 * v_height, 0.45, 1.0);  // less sky near the ground
-    vec3 bounce = 0.14 * (u_sun_colour * max(u_sun.z, 0.0) + u_horizon);
-    vec3 light = u_sun_colour * sun + shade * mix(bounce, 0.75 * (u_zenith + u_horizon), up * up);
+    vec3 ambient = mix(0.18 * (u_sun_colour * max(u_sun.z, 0.0) + u_horizon), 0.35 * u_zenith + 0.65 * u_horizon, up);
+    vec3 light = u_sun_colour * max(dot(normal, u_sun), 0.0) + shade * ambient;
     vec3 mirror = reflect(view, normal);
-    vec3 world = mix(0.10 * (u_sun_colour + u_horizon), sky(mirror.z), smoothstep(-0.06, 0.05, mirror.z));
+    vec3 world = mix(0.12 * (u_sun_colour + u_horizon), sky(mirror.z), smoothstep(-0.05, 0.04, mirror.z));
     float grazing = 1.0 - facing;
     grazing *= grazing;
     float gloss = material.y + material.z * texel.a;
     float reflection = clamp(gloss * (1.0 + 8.0 * grazing * grazing * grazing), 0.0, 0.9);
     float glint = pow(max(dot(mirror, u_sun), 0.0), 90.0) * min(8.0 * gloss, 1.0);
-    vec3 colour = mix(albedo * light, world, reflection) + glint * u_sun_colour;
+#ifdef NIGHT
+    float beam = own_beam(v_at, normal);
+    light += lamplight(v_at, normal) + beam * vec3(1.0, 0.93, 0.8) * (1.0 + material.w);
+#endif
+    vec3 colour = mix(albedo * light, world, reflection) + glint * u_sun_colour + glow(surface, plain, texel.a);
     o_colour = vec4(film(hazed(colour, distance)), 1.0);
     o_id = v_id;
     o_depth = v_depth;

@@ -6,6 +6,7 @@ uniform sampler2DArray u_textures;
 uniform sampler2D u_shadow;
 uniform vec2 u_paved;
 uniform float u_margin;
+uniform float u_wet;
 uniform int u_lines;
 uniform vec3 u_line[LINES];  // offset, half width (negative: dashed), yellow
 in vec3 v_at;
@@ -50,12 +51,29 @@ void main() {
     vec3 soil = vec3(0.26, 0.22, 0.17) * (0.5 + fine.r);
     float off = max(u_paved.x - d, d - u_paved.y) + 0.35 * (fine.g - 0.5);
     vec3 verge = mix(soil, land, smoothstep(0.3, 1.1, off + 0.8 * (broad.r - 0.5)));
-    vec3 albedo = mix(tarmac, verge, clamp(off / max(wide, 0.03) + 0.5, 0.0, 1.0));
+    float off_road = clamp(off / max(wide, 0.03) + 0.5, 0.0, 1.0);
+    vec3 albedo = mix(tarmac, verge, off_road);
+    float road_mark = kept * (1.0 - off_road);
 
     vec2 pixel = gl_FragCoord.xy / vec2(textureSize(u_shadow, 0));
     float shadow = 1.0 - texture(u_shadow, pixel).r;
-    vec3 light = u_sun_colour * max(u_sun.z, 0.0) * shadow + 0.8 * u_zenith + 0.35 * u_horizon;
-    o_colour = vec4(film(hazed(albedo * light, distance)), 1.0);
+    vec3 light = u_sun_colour * (max(u_sun.z, 0.0) * shadow) + 0.5 * (u_zenith + u_horizon);
+    vec3 view = v_at / distance;
+#ifdef NIGHT
+    float beam = own_beam(v_at, mix(vec3(0.0, 0.0, 1.0), -view, 0.05));
+    light += lamplight(v_at, vec3(0.0, 0.0, 1.0)) + beam * vec3(1.0, 0.93, 0.8) * (1.0 + 3.0 * road_mark);
+#endif
+    vec3 colour = albedo * light;
+    // A wet road is darker and mirrors at grazing angles; water gathers in the wheel tracks.
+    float film_of_water = u_wet * (1.0 - off_road) * clamp(0.55 + 2.5 * (worn.r - 0.5) + 0.5 * (broad.g - 0.4), 0.25, 1.0);
+    float grazing = 1.0 + min(view.z, 0.0);
+    grazing *= grazing;
+    float mirrored = film_of_water * (0.03 + 0.75 * grazing * grazing * grazing);
+    colour = mix(colour * (1.0 - 0.45 * film_of_water), mix(u_horizon, u_zenith, 0.25), mirrored);
+#ifdef NIGHT
+    colour += lampmirror(v_at, view, mix(60.0, 240.0, u_wet)) * (0.004 + 0.10 * film_of_water);
+#endif
+    o_colour = vec4(film(hazed(colour, distance)), 1.0);
     o_id = 1u;
     o_depth = dot(u_forward, v_at);
 }
