@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,31 +30,34 @@ def difficulty(
     Returns:
         ``scored_objects`` and ``scored_boxes`` (those objects' in all frames); ``traces`` by their true
         class, null if the tracker shows none; ``overlapping_pairs`` of scored objects whose boxes meet in
-        some frame; and ``events`` by kind: how often an object that is scored at some time was hidden, how
-        often it was seen again, and the median of the seconds that it then had been hidden.
+        some frame; and ``events`` by kind: how often an object was hidden that had been scored within the
+        second before, how often it was seen again, and the median of the seconds it then had been hidden.
     """
-    objects: set[int] = set()
+    scored_at: dict[int, list[int]] = defaultdict(list)
     pairs: set[tuple[int, int]] = set()
-    scored_boxes = 0
     for truth in log.truth:
         selection = select(truth, width=log.width, height=log.height, boxes=boxes, params=params)
         ids, found = truth.ids[selection.scored], selection.boxes[selection.scored]
-        objects.update(ids.tolist())
-        scored_boxes += len(ids)
+        for vehicle in ids.tolist():
+            scored_at[vehicle].append(truth.tick)
         for a, b in np.argwhere(np.triu(intersection(found, found) > 0, k=1)):
             pairs.add((min(int(ids[a]), int(ids[b])), max(int(ids[a]), int(ids[b]))))
     classes = [trace.truth for trace in traces]
     return {
-        "scored_objects": len(objects),
-        "scored_boxes": scored_boxes,
+        "scored_objects": len(scored_at),
+        "scored_boxes": sum(map(len, scored_at.values())),
         "traces": {name: classes.count(name) if log.traces is not None else None for name in CLASSES},
         "overlapping_pairs": len(pairs),
-        "events": _events(log, objects),
+        "events": _events(log, scored_at),
     }
 
 
-def _events(log: EpisodeLog, objects: set[int]) -> dict[str, Any]:
-    events = [event for event in occlusion_events(log.truth, log.rate) if event.hidden in objects]
+def _events(log: EpisodeLog, scored_at: Mapping[int, Sequence[int]]) -> dict[str, Any]:
+    events = [
+        event
+        for event in occlusion_events(log.truth, log.rate)
+        if any(event.first - log.rate <= tick < event.first for tick in scored_at.get(event.hidden, ()))
+    ]
     kinds = {
         "occluded": [event for event in events if event.occluder],
         "out_of_view": [event for event in events if not event.occluder],

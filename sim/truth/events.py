@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,27 +35,24 @@ def occlusion_events(truths: Sequence[FrameTruth], rate: int) -> tuple[Occlusion
     Returns:
         The events, by their first frame, then by the hidden vehicle.
     """
-    ticks = np.array([truth.tick for truth in truths], np.int64)
     shortest = max(1, round(SHORTEST * rate))
     found = []
-    for vehicle, rows in _rows_by_vehicle(truths).items():
+    for vehicle, life in _lives(truths).items():
         visible = np.zeros(len(truths))
-        for frame, row in rows:
-            visible[frame] = truths[frame].visible[row]
-        row_of = dict(rows)
+        visible[list(life)] = [sight.visible for sight in life.values()]
         for first, last, back in _spans(visible):
             if last - first + 1 < shortest:
                 continue
             returned = None
             if back is not None:
-                x0, y0, x1, y1 = truths[back].box_visible[row_of[back]]
+                x0, y0, x1, y1 = truths[back].box_visible[life[back].row]
                 returned = (float((x0 + x1) / 2), float((y0 + y1) / 2))
             found.append(
                 OcclusionEvent(
                     hidden=vehicle,
-                    occluder=_occluder(truths, row_of, first, last),
-                    first=int(ticks[first]),
-                    last=int(ticks[last]),
+                    occluder=_occluder(life, first, last),
+                    first=truths[first].tick,
+                    last=truths[last].tick,
                     deepest=float(visible[first : last + 1].min()),
                     returned=returned,
                 )
@@ -62,13 +60,24 @@ def occlusion_events(truths: Sequence[FrameTruth], rate: int) -> tuple[Occlusion
     return tuple(sorted(found, key=lambda event: (event.first, event.hidden)))
 
 
-def _rows_by_vehicle(truths: Sequence[FrameTruth]) -> dict[int, list[tuple[int, int]]]:
-    """List the (frame, row) pairs of each vehicle."""
-    rows: dict[int, list[tuple[int, int]]] = defaultdict(list)
+class _Sight(NamedTuple):
+    """A vehicle in one frame: its row of the truth, its shares, and who hides it."""
+
+    row: int
+    visible: float
+    in_frame: float
+    occluder: int
+
+
+def _lives(truths: Sequence[FrameTruth]) -> dict[int, dict[int, _Sight]]:
+    """Give each vehicle's sights by frame."""
+    lives: dict[int, dict[int, _Sight]] = defaultdict(dict)
     for frame, truth in enumerate(truths):
-        for row, vehicle in enumerate(truth.ids.tolist()):
-            rows[vehicle].append((frame, row))
-    return rows
+        columns = (truth.visible, truth.in_frame, truth.occluder_ids)
+        values = zip(truth.ids.tolist(), *(column.tolist() for column in columns), strict=True)
+        for row, (vehicle, *sight) in enumerate(values):
+            lives[vehicle][frame] = _Sight(row, *sight)
+    return lives
 
 
 def _spans(visible: NDArray[np.float64]) -> list[tuple[int, int, int | None]]:
@@ -87,18 +96,16 @@ def _spans(visible: NDArray[np.float64]) -> list[tuple[int, int, int | None]]:
     return spans
 
 
-def _occluder(truths: Sequence[FrameTruth], row_of: dict[int, int], first: int, last: int) -> int:
+def _occluder(life: dict[int, _Sight], first: int, last: int) -> int:
     """Return who took most of the vehicle over the event, 0 where that was the frame's border."""
     taken: dict[int, float] = defaultdict(float)
     for frame in range(first, last + 1):
-        row = row_of.get(frame)
-        if row is None:
+        if frame in life:
+            sight = life[frame]
+            taken[0] += 1.0 - sight.in_frame
+            taken[sight.occluder] += sight.in_frame - sight.visible
+        else:
             taken[0] += 1.0
-            continue
-        truth = truths[frame]
-        inside = float(truth.in_frame[row])
-        taken[0] += 1.0 - inside
-        taken[int(truth.occluder_ids[row])] += inside - float(truth.visible[row])
     # Objects together against the border, then the largest among them.
     border = taken.pop(0, 0.0)
     if not taken or sum(taken.values()) < border:

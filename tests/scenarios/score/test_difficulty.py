@@ -39,6 +39,14 @@ def test_objects_pairs_and_events() -> None:
     }
 
 
+def test_what_was_hidden_far_away_is_no_event() -> None:
+    far = Car(id=CAR, distance=200)
+    cars = [[far]] * 5 + [[Car(id=CAR, distance=150, visible=0.0, occluder=9)]] * 10 + [[Car(id=CAR)]] * 5
+    difficulty = score(episode(cars))[1]
+    assert difficulty["scored_objects"] == 1
+    assert difficulty["events"]["occluded"]["count"] == 0
+
+
 def test_nothing_there() -> None:
     difficulty = score(episode([[]] * 3))[1]
     assert difficulty["scored_objects"] == difficulty["overlapping_pairs"] == 0
