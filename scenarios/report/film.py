@@ -35,12 +35,14 @@ class Film:
         self._pad = ((0, height % 2), (0, width % 2), (0, 0))
         # The index in front lets a browser play before it has read the whole.
         self._container = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
-        stream = self._container.add_stream("libx264", rate=Fraction(rate).limit_denominator(1001))
+        frequency = Fraction(rate).limit_denominator(1001)
+        stream = self._container.add_stream("libx264", rate=frequency)
         stream.width, stream.height = width + width % 2, height + height % 2
         stream.pix_fmt = "yuv420p"
-        # Two threads: x264's output depends on their number, so it is not left to the machine.
+        # As many threads on any machine: the coding depends on their number.
         stream.options = {"crf": str(CRF), "preset": "veryfast", "threads": "2"}
         self._stream = stream
+        self._tick = 1 / frequency
         self._open = True
 
     def __enter__(self) -> Self:
@@ -56,6 +58,7 @@ class Film:
         if self._pad != ((0, 0), (0, 0), (0, 0)):
             image = np.pad(image, self._pad, mode="edge")
         frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+        frame.pts, frame.time_base = self.frames, self._tick
         self._container.mux(self._stream.encode(frame))
         self.frames += 1
 

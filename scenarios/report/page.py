@@ -163,8 +163,8 @@ def _film_note(recording: Recording) -> str:
     if recording.film_frames == recording.frames:
         return ""
     return (
-        f"The video shows the first {recording.film_frames / recording.rate:.0f} s"
-        f" of {recording.frames / recording.rate:.0f} s."
+        f"The video shows the first {recording.film_frames / recording.rate:g} s"
+        f" of {recording.frames / recording.rate:.1f} s."
     )
 
 
