@@ -12,7 +12,7 @@ from sim.models import Ground
 from sim.render.instances import COMMAND
 from sim.rng import stream
 
-PERIOD = 256.0
+PERIOD = 240.0
 """Metres of road after which the baked textures repeat; arc lengths in shaders are taken modulo this."""
 
 MARGIN = 4.0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.camera import Camera, Pose
-from sim.models import Model
+from sim.models import Mesh, Model
 from sim.world import Bodies
 
 INSTANCE = np.dtype(
@@ -68,6 +68,7 @@ class Library:
 
     def __init__(self, models: Sequence[Model]) -> None:
         meshes = [mesh for model in models for mesh in model.lods]
+        self._meshes = meshes
         self.vertices = np.concatenate(
             [
                 np.column_stack([mesh.vertices, mesh.normals, mesh.uvs, mesh.surfaces]).astype(np.float32)
@@ -96,6 +97,10 @@ class Library:
                 for model in models
             ]
         )
+
+    def mesh(self, index: int) -> Mesh:
+        """Return a mesh by the index that `Selection` uses."""
+        return self._meshes[index]
 
     def select(
         self, bodies: Bodies, camera: Camera, pose: Pose, *, widen: float = 1.0, coarsest: bool = False

@@ -20,9 +20,9 @@ void main() {
     float s = v_road.x, d = v_road.y;
     float distance = length(v_at);
     float wide = fwidth(d), along = fwidth(s);
-    vec4 worn = texture(u_road, vec2((d - u_paved.x + u_margin) / (u_paved.y - u_paved.x + 2.0 * u_margin), s / 256.0), -1.5);
+    vec4 worn = texture(u_road, vec2((d - u_paved.x + u_margin) / (u_paved.y - u_paved.x + 2.0 * u_margin), s / 240.0), -1.5);
     vec4 fine = texture(u_grain, vec2(d / 2.0, s / 8.0), -1.0);
-    vec4 broad = texture(u_grain, vec2(d / 64.0, s / 64.0));
+    vec4 broad = texture(u_grain, vec2(d / 60.0, s / 60.0));
 
     float painted = 0.0, yellow = 0.0;
     for (int i = 0; i < u_lines; i++) {
