@@ -28,6 +28,10 @@ METRES_PER_REPEAT = {
 """How much of a surface one repeat of its texture covers; the others repeat every metre."""
 
 
+SHOWN_ONCE = (Surface.TAIL_LAMP, Surface.HEAD_LAMP)
+"""Surfaces whose texture covers each cell of a `MeshBuilder.grid` exactly once."""
+
+
 class MeshBuilder:
     """A soup of textured triangles in a model's frame: x ahead, y to the left, z up."""
 
@@ -52,7 +56,7 @@ class MeshBuilder:
         """Add a convex polygon as a fan.
 
         Args:
-            points: (N, 3) metres, counter-clockwise from outside, or in either order when ``facing`` is given.
+            points: (N, 3) metres, counter-clockwise from outside; in either order if ``facing`` is given.
             surface: What it is made of.
             facing: (3,) a direction on its outer side.
             uv: (N, 2) texture coordinates; by default the polygon is laid flat on the texture.
@@ -144,7 +148,9 @@ class MeshBuilder:
         for i in range(rows):
             for j in range(columns):
                 quad = lattice[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
-                self.polygon(quad, Surface(int(kinds[i, j])), facing=quad.mean(axis=0) - within[i, j])
+                kind = Surface(int(kinds[i, j]))
+                lens = [(0, 0), (1, 0), (1, 1), (0, 1)] if kind in SHOWN_ONCE else None
+                self.polygon(quad, kind, facing=quad.mean(axis=0) - within[i, j], uv=lens)
 
     def prism(
         self,

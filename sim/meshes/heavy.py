@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from sim.meshes.builder import MeshBuilder, scaled_to
+from sim.meshes.builder import MeshBuilder
 from sim.meshes.cars import SWITCH
 from sim.models import Mesh, Model, Surface
 from sim.world import Kind
@@ -42,7 +42,7 @@ def heavy_models() -> tuple[Model, ...]:
 def _mesh(make: _Maker, size: tuple[float, float, float], detail: int) -> Mesh:
     builder = MeshBuilder()
     make(builder, size, detail)
-    return scaled_to(builder, size)
+    return builder.build()
 
 
 def sweep(
@@ -117,8 +117,15 @@ def _pane(
 
 
 def _tyres(
-    builder: MeshBuilder, axles: Sequence[float], half: float, radius: float, width: float, detail: int
+    builder: MeshBuilder,
+    axles: Sequence[float],
+    half: float,
+    radius: float,
+    width: float,
+    detail: int,
+    arch: float = 0.0,
 ) -> None:
+    """Add the wheels; ``arch`` is the radius of the dark wheel arch on the flank, 0 for none."""
     for x in axles:
         if detail == 0:
             builder.box(
@@ -129,6 +136,13 @@ def _tyres(
         for side in (1, -1):
             if detail == 2:
                 builder.wheel((x, side * (half - width / 2), radius), radius, width, sides=10, outer=side)
+                if arch:
+                    turn = np.linspace(0, np.pi, 6)
+                    outline = np.stack(
+                        [x + arch * np.cos(turn), np.full(6, 0.0), radius + arch * np.sin(turn)], 1
+                    )
+                    outline[:, 1] = side * (half - 0.004)
+                    builder.polygon(outline, Surface.PLASTIC, facing=(0, side, 0))
             else:
                 y = sorted((side * half, side * (half - width)))
                 builder.box(
@@ -178,7 +192,7 @@ def _van(builder: MeshBuilder, size: tuple[float, float, float], detail: int) ->
         _front_patch(builder, front - 0.05, (y[0], y[1]), (hood - 0.42, hood - 0.20), Surface.HEAD_LAMP, 0.03)
     builder.box((rear - 0.0, -half * 0.95, 0.30), (rear + 0.12, half * 0.95, 0.52), Surface.PLASTIC)
     _patch(builder, rear, (-0.26, 0.26), (0.60, 0.71), Surface.PLATE, 0.02)
-    _tyres(builder, (rear + 0.95, front - 0.90), half, 0.33, 0.22, detail)
+    _tyres(builder, (rear + 0.95, front - 0.90), half + 0.01, 0.33, 0.22, detail, arch=0.40)
     if detail:
         _front_patch(
             builder,
@@ -319,7 +333,7 @@ def _bus(builder: MeshBuilder, size: tuple[float, float, float], detail: int) ->
                      (rear + 0.07, -half * 0.84, height - 0.38), (rear + 0.07, half * 0.84, height - 0.38)])  # fmt: skip
     builder.decal(back, Surface.GLASS, facing=BACK, lift=0.02)
     _lamps(builder, rear, half, (0.78, 0.94), (0.85, 1.30))
-    _tyres(builder, (rear + 3.3, front - 2.7), half * 1.0, 0.48, 0.40, detail)
+    _tyres(builder, (rear + 3.3, front - 2.7), half + 0.015, 0.48, 0.40, detail, arch=0.58)
     if detail:
         _patch(builder, rear, (-half * 0.6, half * 0.6), (0.80, 1.35), Surface.PLASTIC)
         _patch(builder, rear, (-0.26, 0.26), (0.62, 0.73), Surface.PLATE, 0.02)

@@ -1,4 +1,4 @@
-"""Trees and bushes: opaque crowns of jagged clumps, since a renderer of ids knows no half-transparent leaf."""
+"""Trees and bushes: opaque crowns of jagged clumps, since an id map knows no half-transparent leaf."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ SWITCH = (45.0, 130.0)
 
 _SEED = 20110602
 
-# Name, size, number of clumps, crown's lower edge as a share of the height, spread of the clumps.
+# Name, size, number of clumps, crown's lower edge as a share of the height.
 _BROADLEAF = (
-    ("broadleaf-a", (7.0, 7.0, 9.0), 7, 0.28),
-    ("broadleaf-b", (9.5, 9.5, 12.5), 8, 0.26),
-    ("broadleaf-c", (5.0, 5.0, 7.0), 6, 0.30),
-    ("broadleaf-d", (6.5, 6.5, 14.0), 8, 0.20),
-    ("broadleaf-e", (8.0, 8.0, 7.0), 7, 0.22),
+    ("broadleaf-a", (7.5, 7.5, 9.0), 8, 0.17),
+    ("broadleaf-b", (10.5, 10.5, 12.5), 9, 0.16),
+    ("broadleaf-c", (5.2, 5.2, 6.8), 7, 0.20),
+    ("broadleaf-d", (7.0, 7.0, 14.5), 9, 0.12),
+    ("broadleaf-e", (8.5, 8.5, 6.6), 8, 0.10),
 )
 _CONIFER = (("conifer-a", (4.0, 4.0, 12.0)), ("conifer-b", (5.0, 5.0, 16.0)))
 _BUSH = (
@@ -96,6 +96,7 @@ def clump(
         faces = faces[:, ::-1]
     dents = np.clip(rng.normal(1, rough, len(corners)), 0.6, 1.5)[:, None]
     points = centre + corners * dents * radii
+    points[:, 2] = np.maximum(points[:, 2], 0.0)
     fluff = corners + rng.normal(0, 0.30, corners.shape)
     fluff /= np.linalg.norm(fluff, axis=1, keepdims=True)
     shift = rng.uniform(0, 1, 2)
@@ -107,11 +108,14 @@ def clump(
         side = np.cross(out, rng.normal(size=3))
         side /= np.linalg.norm(side)
         other = np.cross(out, side)
-        tip = centre + out * radii * rng.uniform(1.10, 1.55) + rng.normal(0, 0.12, 3) * radii
+        tip = centre + out * radii * rng.uniform(1.05, 1.38) + rng.normal(0, 0.10, 3) * radii
         ring = [
-            centre + radii * (0.72 * out + 0.40 * (np.cos(a) * side + np.sin(a) * other))
+            centre + radii * (0.72 * out + 0.34 * (np.cos(a) * side + np.sin(a) * other))
             for a in (0.0, 2.1, 4.2)
         ]
+        tip[2] = max(tip[2], 0.0)
+        for corner in ring:
+            corner[2] = max(corner[2], 0.0)
         normal = out + rng.normal(0, 0.35, 3)
         normal /= np.linalg.norm(normal)
         for i in range(3):
@@ -136,34 +140,38 @@ def _broadleaf(name: str, size: tuple[float, float, float], clumps: int, low: fl
     middle = (base + top) / 2
     lean = rng.normal(0, 0.02 * width, 2)
     builder.prism(
-        (0, 0, 0), (lean[0], lean[1], middle), (0.022 * height + 0.05, 0.012 * height), Surface.BARK,
+        (0, 0, 0), (lean[0], lean[1], middle), (0.024 * height + 0.06, 0.014 * height), Surface.BARK,
         sides=(5, 4, 3)[2 - detail],
     )  # fmt: skip
-    core = np.array([0.30 * width, 0.30 * width, 0.36 * (top - base)])
-    # The same clumps on every level, the coarser ones keep the biggest, swollen to fill the same outline.
-    angles = np.linspace(0, 2 * np.pi, clumps, endpoint=False) + rng.uniform(-0.4, 0.4, clumps)
-    lifts = rng.permutation(np.linspace(-0.62, 0.78, clumps))
-    radii = rng.uniform(0.17, 0.25, clumps) * width
-    keep = {2: clumps, 1: 3, 0: 1}[detail]
-    swell = {2: 1.0, 1: 1.35, 0: 1.0}[detail]
+    deep = top - base
     shape = stream(_SEED, "plants", name, "clumps")
     if detail == 0:
         clump(
             builder,
             np.array([0, 0, middle]),
-            np.array([0.44 * width, 0.44 * width, 0.5 * (top - base)]),
+            np.array([0.46 * width, 0.46 * width, 0.48 * deep]),
             shape,
-            spikes=4,
+            spikes=5,
+            rough=0.16,
         )
         return scaled_to(builder, size)
-    clump(builder, np.array([lean[0], lean[1], middle]), core, shape, spikes=6 if detail == 2 else 2)
-    for i in range(keep):
-        spread = 0.34 * width * np.sqrt(max(0.12, 1 - lifts[i] ** 2))
+    # The same clumps on both finer levels; the coarser keeps a few, swollen to fill the same outline.
+    angles = np.arange(clumps) * 2.4 + rng.uniform(-0.4, 0.4, clumps)
+    lifts = np.linspace(-0.75, 0.85, clumps) + rng.uniform(-0.1, 0.1, clumps)
+    radii = rng.uniform(0.19, 0.27, clumps) * width
+    chosen = range(clumps) if detail == 2 else range(0, clumps, 3)
+    swell = 1.0 if detail == 2 else 1.3
+    clump(
+        builder, np.array([lean[0], lean[1], middle]), np.array([0.37 * width, 0.37 * width, 0.42 * deep]), shape,
+        spikes=8 if detail == 2 else 4,
+    )  # fmt: skip
+    for i in chosen:
+        spread = 0.33 * width * np.sqrt(max(0.1, 1 - lifts[i] ** 2))
         centre = np.array(
-            [spread * np.cos(angles[i]), spread * np.sin(angles[i]), middle + lifts[i] * 0.40 * (top - base)]
+            [spread * np.cos(angles[i]), spread * np.sin(angles[i]), middle + lifts[i] * 0.36 * deep]
         )
         clump(
-            builder, centre, swell * radii[i] * np.array([1, 1, 0.85]), shape, spikes=4 if detail == 2 else 2
+            builder, centre, swell * radii[i] * np.array([1, 1, 0.8]), shape, spikes=5 if detail == 2 else 3
         )
     return scaled_to(builder, size)
 
@@ -200,10 +208,10 @@ def _bush(name: str, size: tuple[float, float, float], clumps: int, detail: int)
     count = clumps if detail == 2 else (2 if detail else 1)
     for i in range(count):
         turn = 2 * np.pi * (i + rng.uniform(0, 0.5)) / count
-        centre = np.array([0.22 * length * np.cos(turn), 0.22 * width * np.sin(turn), height * 0.42]) * (
+        centre = np.array([0.22 * length * np.cos(turn), 0.22 * width * np.sin(turn), height * 0.36]) * (
             count > 1
         )
-        centre[2] = height * 0.42
+        centre[2] = height * 0.36
         radii = np.array([0.30 * length, 0.30 * width, 0.46 * height]) * rng.uniform(0.8, 1.1)
         clump(builder, centre, radii, rng, spikes=(0, 3, 7)[detail])
     return scaled_to(builder, size)

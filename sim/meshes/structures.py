@@ -15,6 +15,10 @@ FLOOR = 3.2
 """Height of a storey, metres; also the width of a window's bay."""
 
 
+WOODS = (120.0, 12.0, 13.0)
+"""Size of a strip of distant wood, metres."""
+
+
 def structure_models() -> tuple[Model, ...]:
     """Make buildings, bridges, distant woods and hills."""
     houses = tuple(
@@ -52,7 +56,7 @@ def structure_models() -> tuple[Model, ...]:
         Model(name="bridge-b", kind=Kind.BRIDGE, size=(6.0, 60.0, 7.0), lods=(_bridge((6.0, 60.0, 7.0)),)),
     )
     woods = tuple(
-        Model(name=f"woods-{letter}", kind=Kind.TREE, size=(120.0, 14.0, 13.0), lods=(_woods(letter),))
+        Model(name=f"woods-{letter}", kind=Kind.TREE, size=WOODS, lods=_woods(letter), switch=(220.0,))
         for letter in "abc"
     )
     hills = tuple(
@@ -62,12 +66,25 @@ def structure_models() -> tuple[Model, ...]:
     return houses + blocks + bridges + woods + hills
 
 
+def _walls(builder: MeshBuilder, half_x: float, half_y: float, top: float) -> None:
+    """Add four outer walls whose windows stand in whole bays."""
+    ring = np.array([(-half_x, -half_y), (half_x, -half_y), (half_x, half_y), (-half_x, half_y)])
+    for i in range(4):
+        start, end = ring[i], ring[(i + 1) % 4]
+        width = float(np.hypot(*(end - start)))
+        bays = max(1, round(width / FLOOR)) / 4
+        # A quarter repeat is a bay; each wall starts at another one, so that not all blinds are closed alike.
+        u0, v1 = 0.25 * i, top / FLOOR / 4
+        corners = [(*start, 0.0), (*end, 0.0), (*end, top), (*start, top)]
+        builder.polygon(corners, Surface.FACADE, uv=[(u0, 0), (u0 + bays, 0), (u0 + bays, v1), (u0, v1)])
+
+
 def _house(size: tuple[float, float, float], detail: bool) -> Mesh:
     length, width, height = size
     builder = MeshBuilder()
     eave = height - 0.36 * width
     half_x, half_y = length / 2 - 0.3, width / 2 - 0.4
-    builder.box((-half_x, -half_y, 0), (half_x, half_y, eave), Surface.FACADE, without="-z+z")
+    _walls(builder, half_x, half_y, eave)
     for sign in (1, -1):
         gable = [(sign * half_x, -half_y, eave), (sign * half_x, half_y, eave), (sign * half_x, 0, height)]
         builder.polygon(gable, Surface.CARGO, facing=(sign, 0, 0))
@@ -100,7 +117,7 @@ def _block(size: tuple[float, float, float], detail: bool) -> Mesh:
     length, width, height = size
     builder = MeshBuilder()
     half_x, half_y = length / 2 - 0.2, width / 2 - 0.2
-    builder.box((-half_x, -half_y, 0), (half_x, half_y, height - 0.6), Surface.FACADE, without="-z")
+    _walls(builder, half_x, half_y, height - 0.6)
     builder.box(
         (-half_x - 0.2, -half_y - 0.2, height - 0.7), (half_x + 0.2, half_y + 0.2, height), Surface.CONCRETE
     )
@@ -157,26 +174,42 @@ def _bridge(size: tuple[float, float, float]) -> Mesh:
     return scaled_to(builder, size)
 
 
-def _woods(letter: str) -> Mesh:
-    """Make a strip of distant wood along x: jagged crowns in two ranks, thickest in the middle."""
-    rng = stream(_SEED, "woods", letter)
-    builder = MeshBuilder()
-    count = 40
-    x = np.linspace(-60, 60, count)
-    swell = np.sqrt(np.clip(1 - (x / 62) ** 2, 0.05, 1))
-    for side in (1, -1):
-        tops = (7.5 + 4.5 * rng.uniform(-0.6, 1, count)) * swell
-        ledge = tops * rng.uniform(0.45, 0.75, count)
-        rows = np.stack(
-            [
-                np.stack([x, np.full(count, side * 7.0), np.zeros(count)], axis=1),
-                np.stack([x + rng.normal(0, 1, count), side * rng.uniform(5, 7, count), ledge], axis=1),
-                np.stack([x + rng.normal(0, 1, count), side * rng.uniform(0.5, 3, count), tops], axis=1),
-                np.stack([x, np.zeros(count), tops * 0.6], axis=1),
-            ]
+def _woods(letter: str) -> tuple[Mesh, Mesh]:
+    """Make a strip of distant wood along x, fine and coarse: overlapping round crowns, lower toward the ends."""
+    meshes = []
+    for columns in (4, 2):
+        rng = stream(_SEED, "woods", letter)
+        crowns = 17
+        foot = np.linspace(-60, 60, crowns + 1)
+        heights = (9.0 + 4.0 * rng.uniform(-1, 1, crowns)) * np.clip(
+            1.15 - (np.abs(foot[:-1] + 3.5) / 62) ** 4, 0.4, 1
         )
-        builder.grid(rows, Surface.FOLIAGE, inside=(0, -side * 40, -60))
-    return scaled_to(builder, (120.0, 14.0, 13.0))
+        reach = rng.uniform(0.75, 1.0, crowns)
+        bend = np.linspace(0, np.pi, columns, endpoint=False) + np.pi / (2 * columns)
+        x = (foot[:-1, None] + (foot[1:] - foot[:-1])[:, None] * (0.5 - 0.5 * np.cos(bend))).ravel()
+        tops = (heights[:, None] * (0.68 + 0.32 * np.sin(bend))).ravel()
+        tops *= stream(_SEED, "woods", letter, "twigs").uniform(0.93, 1.07, 4 * crowns)[:: 4 // columns]
+        depth = np.repeat(reach, columns)
+        flat = np.zeros(len(x))
+        builder = MeshBuilder()
+        for side in (1, -1):
+            rows = [
+                (flat + side * 6.0 * depth, flat),
+                (side * 5.0 * depth, 0.62 * tops),
+                (side * 1.5 * depth, tops),
+            ]
+            rows += [(flat, 0.8 * tops)]
+            lattice = np.stack([np.stack([x, y, z], axis=1) for y, z in rows])
+            fluff = rng.normal(0, 0.45, lattice.shape) + np.array([0.0, 0.8 * side, 0.45])
+            fluff /= np.linalg.norm(fluff, axis=2, keepdims=True)
+            for i in range(len(rows) - 1):
+                for j in range(len(x) - 1):
+                    pick = ([i, i + 1, i + 1, i], [j, j, j + 1, j + 1])
+                    builder.polygon(
+                        lattice[pick], Surface.FOLIAGE, facing=(0, side, 0.6), normals=fluff[pick]
+                    )
+        meshes.append(scaled_to(builder, WOODS))
+    return meshes[0], meshes[1]
 
 
 def _hill(letter: str) -> Mesh:
