@@ -15,7 +15,7 @@ CREASE = np.radians(38.0)
 """Faces that meet at a sharper angle keep an edge between them."""
 
 METRES_PER_REPEAT = {
-    Surface.FOLIAGE: 2.4,
+    Surface.FOLIAGE: 3.2,
     Surface.BARK: 1.2,
     Surface.CONCRETE: 4.0,
     Surface.FACADE: 12.8,

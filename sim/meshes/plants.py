@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sim.meshes.builder import Floats, MeshBuilder, scaled_to
@@ -70,66 +72,74 @@ def _icosahedron() -> tuple[Floats, Floats]:
     return corners / np.linalg.norm(corners, axis=1, keepdims=True), faces
 
 
-def clump(
+def crown(
     builder: MeshBuilder,
-    centre: Floats,
-    radii: Floats,
+    blobs: Sequence[tuple[Floats, Floats]],
     rng: np.random.Generator,
     *,
-    spikes: int,
-    rough: float = 0.24,
+    leaves: int,
+    leaf: float,
 ) -> None:
-    """Add a lump of leaves: a dented icosahedron, and twigs that break its outline.
+    """Add a crown: dented lumps, and around them leaf clumps that break the outline.
 
     Args:
         builder: Takes the faces.
-        centre: (3,) metres.
-        radii: (3,) metres.
-        rng: Of the dents.
-        spikes: How many three-sided twigs stand out.
-        rough: Relative standard deviation of the corners' distance.
+        blobs: Centre (3,) and radii (3,) of each lump, metres.
+        rng: Of dents and leaves.
+        leaves: How many leaf clumps, single triangles that look outward.
+        leaf: Their size, metres.
     """
     corners, faces = _icosahedron()
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    corners = corners @ turn
-    if np.linalg.det(turn) < 0:
-        faces = faces[:, ::-1]
-    dents = np.clip(rng.normal(1, rough, len(corners)), 0.6, 1.5)[:, None]
-    points = centre + corners * dents * radii
-    points[:, 2] = np.maximum(points[:, 2], 0.0)
-    fluff = corners + rng.normal(0, 0.30, corners.shape)
-    fluff /= np.linalg.norm(fluff, axis=1, keepdims=True)
-    shift = rng.uniform(0, 1, 2)
-    for face in faces:
-        uv = _leaf_uv(points[face], corners[face].mean(axis=0)) + shift
-        builder.polygon(points[face], Surface.FOLIAGE, uv=uv, normals=fluff[face])
-    for direction in rng.normal(size=(spikes, 3)):
-        out = direction / np.linalg.norm(direction)
-        side = np.cross(out, rng.normal(size=3))
-        side /= np.linalg.norm(side)
-        other = np.cross(out, side)
-        tip = centre + out * radii * rng.uniform(1.05, 1.38) + rng.normal(0, 0.10, 3) * radii
-        ring = [
-            centre + radii * (0.72 * out + 0.34 * (np.cos(a) * side + np.sin(a) * other))
-            for a in (0.0, 2.1, 4.2)
-        ]
-        tip[2] = max(tip[2], 0.0)
-        for corner in ring:
-            corner[2] = max(corner[2], 0.0)
-        normal = out + rng.normal(0, 0.35, 3)
+    for centre, radii in blobs:
+        dents = np.clip(rng.normal(0.84, 0.10, len(corners)), 0.6, 1.1)[:, None]
+        points = centre + corners * dents * radii
+        points[:, 2] = np.maximum(points[:, 2], 0.0)
+        fluff = _unit(corners + rng.normal(0, 0.45, corners.shape))
+        shift = rng.uniform(0, 1, 2)
+        for face in faces:
+            uv = _leaf_uv(points[face], corners[face].mean(axis=0)) + shift
+            builder.polygon(points[face], Surface.FOLIAGE, uv=uv, normals=fluff[face])
+    surfaces = np.array([np.prod(radii) ** (2 / 3) for _, radii in blobs])
+    homes = rng.choice(len(blobs), size=3 * leaves, p=surfaces / surfaces.sum())
+    directions = _unit(rng.normal(size=(3 * leaves, 3)))
+    rolls = rng.random((3 * leaves, 4))
+    tilts = rng.normal(0, 0.55, (3 * leaves, 3))
+    placed = 0
+    for home, out, roll, tilt in zip(homes, directions, rolls, tilts, strict=True):
+        centre, radii = blobs[home]
+        at = centre + out * radii * (0.82 + 0.20 * roll[0])
+        hidden = any(
+            np.linalg.norm((at - other) / extent) < 0.82
+            for i, (other, extent) in enumerate(blobs)
+            if i != home
+        )
+        if hidden or at[2] < 0.3 * leaf or placed == leaves:
+            continue
+        placed += 1
+        normal = out + tilt
         normal /= np.linalg.norm(normal)
-        for i in range(3):
-            corner = np.stack([ring[i], ring[(i + 1) % 3], tip])
-            builder.polygon(
-                corner, Surface.FOLIAGE, facing=corner.mean(axis=0) - centre - 0.8 * out * radii,
-                uv=_leaf_uv(corner, out) + shift, normals=np.tile(normal, (3, 1)),
-            )  # fmt: skip
+        side = np.cross(normal, [0.31, -0.52, 0.80])
+        side /= np.linalg.norm(side)
+        turn = 2 * np.pi * (roll[1] + np.array([0.0, 0.30 + 0.1 * roll[2], 0.66]))
+        size = leaf * (0.7 + 0.6 * roll[3]) * np.array([1.0, 0.62, 0.85])
+        ring = at + size[:, None] * (
+            np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(normal, side)
+        )
+        ring[:, 2] = np.maximum(ring[:, 2], 0.0)
+        shade = np.tile(_unit((out + 0.6 * tilt)[None])[0], (3, 1))
+        builder.polygon(
+            ring, Surface.FOLIAGE, facing=normal, uv=_leaf_uv(ring, normal) + roll[2:], normals=shade
+        )
+
+
+def _unit(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def _leaf_uv(points: Floats, normal: Floats) -> Floats:
     axis = int(np.argmax(np.abs(normal)))
     flat = np.delete(points, axis, axis=1)
-    return np.asarray(flat / 2.4)
+    return np.asarray(flat / 3.2)
 
 
 def _broadleaf(name: str, size: tuple[float, float, float], clumps: int, low: float, detail: int) -> Mesh:
@@ -144,35 +154,31 @@ def _broadleaf(name: str, size: tuple[float, float, float], clumps: int, low: fl
         sides=(5, 4, 3)[2 - detail],
     )  # fmt: skip
     deep = top - base
-    shape = stream(_SEED, "plants", name, "clumps")
-    if detail == 0:
-        clump(
-            builder,
-            np.array([0, 0, middle]),
-            np.array([0.46 * width, 0.46 * width, 0.48 * deep]),
-            shape,
-            spikes=5,
-            rough=0.16,
-        )
-        return scaled_to(builder, size)
-    # The same clumps on both finer levels; the coarser keeps a few, swollen to fill the same outline.
     angles = np.arange(clumps) * 2.4 + rng.uniform(-0.4, 0.4, clumps)
     lifts = np.linspace(-0.75, 0.85, clumps) + rng.uniform(-0.1, 0.1, clumps)
-    radii = rng.uniform(0.19, 0.27, clumps) * width
-    chosen = range(clumps) if detail == 2 else range(0, clumps, 3)
-    swell = 1.0 if detail == 2 else 1.3
-    clump(
-        builder, np.array([lean[0], lean[1], middle]), np.array([0.37 * width, 0.37 * width, 0.42 * deep]), shape,
-        spikes=8 if detail == 2 else 4,
-    )  # fmt: skip
-    for i in chosen:
-        spread = 0.33 * width * np.sqrt(max(0.1, 1 - lifts[i] ** 2))
+    radii = rng.uniform(0.18, 0.27, clumps) * width
+    blobs = [(np.array([lean[0], lean[1], middle]), np.array([0.36 * width, 0.36 * width, 0.42 * deep]))]
+    for i in range(clumps):
+        spread = 0.32 * width * np.sqrt(max(0.1, 1 - lifts[i] ** 2))
         centre = np.array(
             [spread * np.cos(angles[i]), spread * np.sin(angles[i]), middle + lifts[i] * 0.36 * deep]
         )
-        clump(
-            builder, centre, swell * radii[i] * np.array([1, 1, 0.8]), shape, spikes=5 if detail == 2 else 3
-        )
+        blobs.append((centre, radii[i] * np.array([1, 1, 0.8])))
+    # Coarser levels keep fewer lumps, swollen to fill the same outline.
+    if detail < 2:
+        swell = 1.25 if detail else 1.35
+        blobs = [
+            (centre, extent * (1 if i == 0 else swell))
+            for i, (centre, extent) in enumerate(blobs[:: 3 if detail else 5])
+        ]
+    leaves = (14, 56, 260)[detail]
+    crown(
+        builder,
+        blobs,
+        stream(_SEED, "plants", name, "leaves"),
+        leaves=leaves,
+        leaf=(0.20, 0.13, 0.085)[detail] * width,
+    )
     return scaled_to(builder, size)
 
 
@@ -206,12 +212,21 @@ def _bush(name: str, size: tuple[float, float, float], clumps: int, detail: int)
     builder = MeshBuilder()
     length, width, height = size
     count = clumps if detail == 2 else (2 if detail else 1)
+    blobs = []
     for i in range(count):
         turn = 2 * np.pi * (i + rng.uniform(0, 0.5)) / count
-        centre = np.array([0.22 * length * np.cos(turn), 0.22 * width * np.sin(turn), height * 0.36]) * (
-            count > 1
+        away = 0.22 * (count > 1)
+        centre = np.array([away * length * np.cos(turn), away * width * np.sin(turn), height * 0.34])
+        spread = 0.30 if count > 1 else 0.42
+        blobs.append(
+            (centre, np.array([spread * length, spread * width, 0.5 * height]) * rng.uniform(0.85, 1.1))
         )
-        centre[2] = height * 0.36
-        radii = np.array([0.30 * length, 0.30 * width, 0.46 * height]) * rng.uniform(0.8, 1.1)
-        clump(builder, centre, radii, rng, spikes=(0, 3, 7)[detail])
+    leaves = (8, 24, 90)[detail]
+    crown(
+        builder,
+        blobs,
+        stream(_SEED, "plants", name, "leaves"),
+        leaves=leaves,
+        leaf=(0.25, 0.18, 0.11)[detail] * length,
+    )
     return scaled_to(builder, size)
