@@ -16,13 +16,22 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-class QuickVehicle(IDMVehicle):
-    """highway-env's `IDMVehicle`, bit for bit, in a quarter of the time.
+class QuickVehicle(IDMVehicle):  # type: ignore[misc]
+    """highway-env's `IDMVehicle`, bit for bit, in a fraction of the time.
 
-    What depends on the position and the heading alone is worked out once a tick. Sums and products are done on
-    plain floats; dot products and elementary functions by the same NumPy calls as in highway-env, because
+    What depends on the position and the heading alone is worked out once a tick. Sums and products are done
+    on plain floats; dot products and elementary functions by the same NumPy calls as in highway-env, because
     others may round differently. Whoever moves the vehicle other than by `step` calls `moved`.
     """
+
+    position: Floats
+    heading: float
+    speed: float
+    crashed: bool
+    impact: Floats | None
+    action: dict[str, float]
+    target_lane_index: LaneIndex
+    timer: float
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         """Take the arguments of `IDMVehicle`."""
@@ -82,7 +91,12 @@ class QuickVehicle(IDMVehicle):
         limit = self.MAX_STEERING_ANGLE
         return float(_clip(np.arctan(2 * np.tan(slip)), -limit, limit))
 
-    def acceleration(self, ego_vehicle: Any, front_vehicle: Any = None, rear_vehicle: Any = None) -> float:
+    def acceleration(
+        self,
+        ego_vehicle: Any,
+        front_vehicle: Any = None,
+        rear_vehicle: Any = None,  # noqa: ARG002
+    ) -> float:
         """Return IDM's acceleration of ``ego_vehicle`` behind ``front_vehicle``, m/s^2."""
         if not ego_vehicle or not isinstance(ego_vehicle, Vehicle):
             return 0.0
@@ -110,7 +124,7 @@ class QuickVehicle(IDMVehicle):
         speed = ego_vehicle.speed
         return float(self.DISTANCE_WANTED + speed * self.TIME_WANTED + speed * closing / (2 * math.sqrt(ab)))
 
-    def act(self, action: Any = None) -> None:
+    def act(self, action: Any = None) -> None:  # noqa: ARG002
         """Decide on lane, steering and acceleration (see `IDMVehicle.act`)."""
         if self.crashed:
             return
@@ -226,7 +240,12 @@ class Driver(QuickVehicle):
         heading_ref = lane.heading_at(later) + math.asin(_clip(sideways / speed, -0.25, 0.25)) - slip
         return self.steer(self.KP_HEADING * wrap_to_pi(heading_ref - self.heading))
 
-    def acceleration(self, ego_vehicle: Any, front_vehicle: Any = None, rear_vehicle: Any = None) -> float:
+    def acceleration(
+        self,
+        ego_vehicle: Any,
+        front_vehicle: Any = None,
+        rear_vehicle: Any = None,  # noqa: ARG002
+    ) -> float:
         """Return the improved IDM's acceleration, m/s^2."""
         if not ego_vehicle:
             return 0.0

@@ -101,7 +101,7 @@ class ActionDriver(Driver):
         self.command: tuple[float, float] | None = None
 
     def told(self, action: NDArray[np.floating[Any]] | None) -> None:
-        """Take an action: (2,) in [-1, 1], acceleration and yaw rate (positive to the right); None rolls on."""
+        """Take an action: (2,) in [-1, 1], acceleration and yaw rate (positive to the right); None rolls."""
         push, turn = (0.0, 0.0) if action is None else (float(a) for a in np.clip(action, -1, 1))
         self.command = (ACCELERATION if push > 0 else BRAKING) * push, YAW_RATE * turn
 

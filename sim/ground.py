@@ -22,9 +22,9 @@ OFF_ROAD = 2.0 * LAND
 def make_ground(road: InCarRoad) -> Ground:
     """Mesh the ground of a road.
 
-    Coordinates (s, d) are linear on every straight. On an arc the rows are so close that the facets miss it by
-    `sim.roads.SAGITTA` at most. The land's columns end where the land would be nearer to another stretch of
-    the road, so that the band never folds over itself.
+    Coordinates (s, d) are linear on every straight. On an arc the rows are so close that the facets miss it
+    by `sim.roads.SAGITTA` at most. The land's columns end where the land would be nearer to another stretch
+    of the road, so that the band never folds over itself.
     """
     rows = np.unique(np.concatenate([_rows(piece) for piece in road.pieces]))
     reach_right, reach_left = (_reach(road, rows, side) for side in (-1.0, 1.0))
@@ -71,13 +71,12 @@ def _reach(road: InCarRoad, rows: Floats, side: float) -> Floats:
     line = np.arange(road.pieces[0].start, road.length, 2.0)
     tree = cKDTree(np.stack(road.to_world(line, 0.0), axis=1))
     shortest = max(-road.paved[0], road.paved[1]) + VERGE
-    reach = np.full(len(rows), LAND)
-    for away in np.linspace(LAND, shortest, 24):
-        points = np.stack(road.to_world(rows, side * away), axis=1)
-        nearest, _ = tree.query(points)
-        taken = nearest < away - 0.05
-        reach = np.where(taken, np.minimum(reach, away), reach)
-    return np.where(reach < LAND, np.maximum(0.85 * reach, shortest), reach)
+    reach, open_ = np.full(len(rows), shortest), np.ones(len(rows), bool)
+    for away in np.linspace(shortest, LAND, 32):
+        nearest, _ = tree.query(np.stack(road.to_world(rows, side * away), axis=1))
+        open_ &= nearest > away - 0.05
+        reach[open_] = away
+    return np.where(open_, reach, np.maximum(0.9 * reach, shortest))
 
 
 def _grid_faces(rows: int, columns: int) -> NDArray[np.int32]:

@@ -1,8 +1,8 @@
 """highway-env's road behind an index, so that a tick no longer costs the square of the number of vehicles.
 
 Every answer is the one that highway-env itself gives, to the last bit. Two ideas make that cheap. Its queries
-return vehicles and lanes, not numbers: they can be decided with any arithmetic whose error is known, and only a
-decision closer than `TOLERANCE` is left to highway-env's own code. And vehicles move in `IndexedRoad.step`
+return vehicles and lanes, not numbers: they can be decided with any arithmetic whose error is known, and only
+a decision closer than `TOLERANCE` is left to highway-env's own code. And vehicles move in `IndexedRoad.step`
 alone, so that what was sorted when they began to decide (`IndexedRoad.act`) holds until all have decided.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,101 +27,98 @@ TOLERANCE = 1e-6
 CELL = 32.0
 """Metres: side of a cell of the lanes' index. Smaller cells hold fewer lanes and are more."""
 NEAR = 12.0
-"""Metres around a cell within which its lanes lie. A vehicle farther than this from all lanes costs a full search."""
+"""Metres around a lane within which cells know of it. Farther from all lanes, every lane is searched."""
 TWO_PI = 2 * math.pi
 
 
 class _Chart:
-    """A lane as plain numbers: local coordinates to within `TOLERANCE`."""
+    """A straight or circular lane as plain numbers: local coordinates to within `TOLERANCE`."""
 
-    __slots__ = ("exact", "half_width", "lane", "length", "margin", "numbers", "straight")
+    __slots__ = ("half_turn", "half_width", "lane", "length", "margin", "numbers", "straight")
 
     def __init__(self, lane: AbstractLane) -> None:
         self.lane = lane
         self.length = float(lane.length)
         self.margin = float(lane.VEHICLE_LENGTH)
+        self.half_width = float(lane.width) / 2 + 1  # the margin of Road.neighbour_vehicles
         self.straight = type(lane) is StraightLane
-        self.exact = not self.straight and type(lane) is not CircularLane
+        self.numbers: tuple[float, float, float, float, float]
         if self.straight:
             self.numbers = (*lane.start.tolist(), *lane.direction.tolist(), float(lane.heading))
-        elif not self.exact:
-            self.numbers = (
-                *lane.center.tolist(),
-                float(lane.radius),
-                float(lane.start_phase),
-                float(lane.direction),
-            )
+            self.half_turn = math.inf
+        else:
+            bend = float(lane.radius), float(lane.start_phase), float(lane.direction)
+            self.numbers = (*lane.center.tolist(), *bend)
+            self.half_turn = math.pi * bend[0]
+
+    def local(self, x: float, y: float) -> tuple[float, float]:
+        """Local coordinates of a position: along and across, metres."""
+        x0, y0, a, b, c = self.numbers
+        dx, dy = x - x0, y - y0
+        if self.straight:
+            return dx * a + dy * b, dy * a - dx * b
+        turn = (math.atan2(dy, dx) - b + math.pi) % TWO_PI - math.pi
+        return c * turn * a, c * (a - math.hypot(dx, dy))
 
     def distance(self, x: float, y: float, heading: float) -> float:
-        """`AbstractLane.distance_with_heading` of a straight or an arc."""
-        if self.straight:
-            x0, y0, ux, uy, along = self.numbers
-            dx, dy = x - x0, y - y0
-            s, r = dx * ux + dy * uy, dy * ux - dx * uy
-        else:
-            x0, y0, radius, start, sense = self.numbers
-            dx, dy = x - x0, y - y0
-            turn = (math.atan2(dy, dx) - start + math.pi) % TWO_PI - math.pi
-            s, r = sense * turn * radius, radius - math.hypot(dx, dy)
-            along = start + turn + math.pi / 2 * sense
+        """`AbstractLane.distance_with_heading`, metres."""
+        s, r = self.local(x, y)
+        _, _, radius, start, along = self.numbers
+        if not self.straight:
+            along = start + along * (s / radius + math.pi / 2)
         angle = (heading - along + math.pi) % TWO_PI - math.pi
-        return abs(r) + max(s - self.length, 0.0) + max(-s, 0.0) + abs(angle)
+        away = abs(r) + abs(angle)
+        if s < 0:
+            return away - s
+        return away + s - self.length if s > self.length else away
 
-    def coordinates(self, positions: Floats) -> tuple[Floats, Floats]:
-        """Local coordinates of (N, 2) positions: along and across, (N,) each."""
-        if self.exact:
-            pairs = np.array([self.lane.local_coordinates(p) for p in positions], float).reshape(-1, 2)
-            return pairs[:, 0], pairs[:, 1]
-        dx, dy = positions[:, 0] - self.numbers[0], positions[:, 1] - self.numbers[1]
-        if self.straight:
-            _, _, ux, uy, _ = self.numbers
-            return dx * ux + dy * uy, dy * ux - dx * uy
-        _, _, radius, start, sense = self.numbers
-        turn = (np.arctan2(dy, dx) - start + np.pi) % TWO_PI - np.pi
-        return sense * turn * radius, sense * (radius - np.hypot(dx, dy))
-
-    def on_lane(self, s: Floats, r: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Who is on the lane as `Road.neighbour_vehicles` sees it, and of whom that is not certain."""
-        if self.exact:
-            width = np.array([self.lane.width_at(one) for one in s])
-        else:
-            width = np.full(len(s), float(self.lane.width))
-        slack = np.minimum(
-            width / 2 + 1 - np.abs(r), np.minimum(s + self.margin, self.length + self.margin - s)
-        )
-        doubtful = np.abs(slack) <= TOLERANCE
-        if not (
-            self.exact or self.straight
-        ):  # half a turn away, s jumps from one end of its range to the other
-            doubtful |= np.abs(np.abs(s) - np.pi * self.numbers[2]) <= TOLERANCE
-        return slack > 0, doubtful
+    def slack(self, s: float, r: float) -> float:
+        """How far inside the lane `Road.neighbour_vehicles` sees a place; 0 where that is in doubt."""
+        slack = min(self.half_width - abs(r), s + self.margin, self.length + self.margin - s)
+        # Half a turn away, s jumps from one end of its range to the other.
+        return 0.0 if abs(slack) <= TOLERANCE or abs(abs(s) - self.half_turn) <= TOLERANCE else slack
 
 
-class IndexedNetwork(RoadNetwork):
+class IndexedNetwork(RoadNetwork):  # type: ignore[misc]
     """A network that finds the closest lane among those of one cell of a grid.
 
-    Lanes must not be added once it is built.
+    Lanes must not be added once it is built. A network with other lanes than straights and arcs is not
+    indexed: it answers as highway-env does, and as slowly.
+
+    Attributes:
+        charts: The lanes as numbers, or None where they are not indexed.
+        sources: For each node the nodes from which roads lead to it, in the graph's order.
     """
 
     def __init__(self, network: RoadNetwork) -> None:
         """Index the lanes of ``network``, whose graph is shared."""
         super().__init__()
         self.graph = network.graph
-        self.charts: dict[LaneIndex, _Chart] = {i: _Chart(lane) for i, lane in self.lanes_dict().items()}
-        self._known = not any(chart.exact for chart in self.charts.values())
+        self.charts: dict[LaneIndex, _Chart] | None = None
         self._cells: dict[tuple[int, int], list[tuple[LaneIndex, _Chart]]] = {}
-        if self._known:
+        self.sources: dict[str, list[str]] = {}
+        for source, roads in self.graph.items():
+            for target, road_lanes in roads.items():
+                if road_lanes:
+                    self.sources.setdefault(target, []).append(source)
+        lanes = self.lanes_dict()
+        if all(_is_plain(lane) for lane in lanes.values()):
+            self.charts = {index: _Chart(lane) for index, lane in lanes.items()}
             for index, chart in self.charts.items():
                 for cell in sorted(_cells_near(chart)):
                     self._cells.setdefault(cell, []).append((index, chart))
 
+    def lanes_near(self, x: float, y: float) -> Sequence[tuple[LaneIndex, _Chart]]:
+        """Return all lanes within `NEAR` of a place, and some more."""
+        return self._cells.get((math.floor(x / CELL), math.floor(y / CELL)), ())
+
     def get_closest_lane_index(self, position: Floats, heading: float | None = None) -> LaneIndex:
         """Return the index of the lane closest to a position and heading (see `RoadNetwork`)."""
-        if heading is not None and self._known:
-            x, y = float(position[0]), float(position[1])
+        if heading is not None:
+            x, y = position.tolist()
             angle = float(heading)
             found, best, second = None, NEAR, math.inf
-            for index, chart in self._cells.get((math.floor(x / CELL), math.floor(y / CELL)), ()):
+            for index, chart in self.lanes_near(x, y):
                 away = chart.distance(x, y, angle)
                 if away < best:
                     found, best, second = index, away, best
@@ -128,8 +126,13 @@ class IndexedNetwork(RoadNetwork):
                     second = away
             if found is not None and second - best > TOLERANCE:
                 return found
-        index: LaneIndex = super().get_closest_lane_index(position, heading)
-        return index
+        closest: LaneIndex = super().get_closest_lane_index(position, heading)
+        return closest
+
+
+def _is_plain(lane: AbstractLane) -> bool:
+    """Whether a lane is one that `_Chart` knows, and lies with its margins within `NEAR`."""
+    return type(lane) in (StraightLane, CircularLane) and lane.width / 2 + 1 + lane.VEHICLE_LENGTH < NEAR
 
 
 def _cells_near(chart: _Chart) -> set[tuple[int, int]]:
@@ -145,28 +148,31 @@ def _cells_near(chart: _Chart) -> set[tuple[int, int]]:
     return cells
 
 
+class _Roll:
+    """Who is on one lane: numbers of bodies, and how far along they are."""
+
+    __slots__ = ("entries", "uncertain")
+
+    def __init__(self) -> None:
+        self.entries: list[tuple[int, float]] = []
+        self.uncertain = False
+
+
 class _Queue:
     """The vehicles on one lane and on those it is connected with, sorted along it."""
 
-    __slots__ = ("order", "places", "uncertain", "vehicles")
+    __slots__ = ("places", "uncertain", "vehicles")
 
-    def __init__(
-        self, pieces: list[tuple[_Chart, float]], vehicles: list[RoadObject], positions: Floats
-    ) -> None:
-        free = np.ones(len(vehicles), bool)
-        s_all = np.zeros(len(vehicles))
-        self.uncertain = False
-        for chart, offset in pieces:
-            s, r = chart.coordinates(positions)
-            on, doubtful = chart.on_lane(s, r)
-            self.uncertain |= bool(np.any(doubtful & free))
-            taken = on & free
-            s_all[taken] = s[taken] + offset
-            free &= ~on
-        chosen = np.flatnonzero(~free)
-        chosen = chosen[np.argsort(s_all[chosen], kind="stable")]
-        self.places = s_all[chosen].tolist()
-        self.vehicles = [vehicles[i] for i in chosen.tolist()]
+    def __init__(self, pieces: list[tuple[_Roll, float]], bodies: list[RoadObject]) -> None:
+        self.uncertain = any(roll.uncertain for roll, _ in pieces)
+        places: dict[int, float] = {}
+        for roll, offset in pieces:
+            for number, s in roll.entries:
+                if number not in places:
+                    places[number] = s + offset
+        order = sorted(places, key=places.__getitem__)
+        self.places = [places[number] for number in order]
+        self.vehicles = [bodies[number] for number in order]
 
     def around(self, vehicle: RoadObject, s: float) -> tuple[Any, Any] | None:
         """Who precedes and who follows ``vehicle`` at ``s``; None where that is too close to call."""
@@ -202,19 +208,22 @@ class _Queue:
         return front, rear
 
 
-class IndexedRoad(Road):
+class IndexedRoad(Road):  # type: ignore[misc]
     """highway-env's `Road` with the same answers, found through indices.
 
     During `act` the positions are taken to stand still, as they do for every vehicle of highway-env. A query
     at any other time indexes the vehicles anew.
     """
 
+    vehicles: list[Any]
+    objects: list[RoadObject]
+
     def __init__(self, network: RoadNetwork, **options: Any) -> None:
         """Index ``network``; ``options`` are those of `Road`."""
         super().__init__(network=IndexedNetwork(network), **options)
         self._acting = False
         self._bodies: list[RoadObject] = []
-        self._positions: Floats = np.zeros((0, 2))
+        self._rolls: dict[_Chart, _Roll] = {}
         self._queues: dict[LaneIndex, _Queue] = {}
 
     def act(self) -> None:
@@ -245,20 +254,17 @@ class IndexedRoad(Road):
         lane_index = lane_index or vehicle.lane_index
         if not lane_index:
             return None, None
-        if not self._acting:
-            self._index()
-        queue = self._queues.get(lane_index)
-        if queue is None:
-            queue = self._queues[lane_index] = _Queue(
-                self._search_lanes(lane_index), self._bodies, self._positions
-            )
-        s = self.network.get_lane(lane_index).local_coordinates(vehicle.position)[0]
-        found = queue.around(vehicle, float(s))
+        charts = self.network.charts
+        found = None
+        if charts is not None and (chart := charts.get(lane_index)) is not None:
+            if not self._acting:
+                self._index()
+            queue = self._queues.get(lane_index)
+            if queue is None:
+                queue = self._queues[lane_index] = _Queue(self._search_lanes(lane_index), self._bodies)
+            found = queue.around(vehicle, chart.local(*vehicle.position.tolist())[0])
         if found is None:
-            exact: tuple[RoadObject | None, RoadObject | None] = super().neighbour_vehicles(
-                vehicle, lane_index
-            )
-            return exact
+            found = super().neighbour_vehicles(vehicle, lane_index)
         return found
 
     def close_objects_to(
@@ -279,28 +285,37 @@ class IndexedRoad(Road):
             self.vehicles, self.objects = whole
 
     def _index(self) -> None:
+        """Note who is on which lane."""
         self._bodies = [b for b in [*self.vehicles, *self.objects] if not isinstance(b, Landmark)]
-        self._positions = np.array([b.position for b in self._bodies], float).reshape(-1, 2)
-        self._queues = {}
+        self._rolls, self._queues = {}, {}
+        for number, body in enumerate(self._bodies):
+            x, y = body.position.tolist()
+            for _, chart in self.network.lanes_near(x, y):
+                s, r = chart.local(x, y)
+                slack = chart.slack(s, r)
+                if slack >= 0.0:
+                    roll = self._rolls.get(chart)
+                    if roll is None:
+                        roll = self._rolls[chart] = _Roll()
+                    roll.entries.append((number, s))
+                    roll.uncertain |= slack == 0.0
 
-    def _search_lanes(self, lane_index: LaneIndex) -> list[tuple[_Chart, float]]:
+    def _search_lanes(self, lane_index: LaneIndex) -> list[tuple[_Roll, float]]:
         """Lanes that `Road.neighbour_vehicles` searches, in its order, with their offsets."""
         charts: dict[LaneIndex, _Chart] = self.network.charts
         graph = self.network.graph
         origin, target, lane_id = lane_index
-        if lane_id is None:
-            lane_id = 0
-        chart = charts[origin, target, lane_id]
+        chart = charts[lane_index]
         pieces = [(chart, 0.0)]
         if self.neighbour_vehicles_connected_lanes:
             for onward, lanes in graph.get(target, {}).items():
                 if lanes:
                     pieces.append((charts[target, onward, _same_or_first(lane_id, lanes)], chart.length))
-            for source, onward_lanes in graph.items():
-                if onward_lanes.get(origin):
-                    before = charts[source, origin, _same_or_first(lane_id, onward_lanes[origin])]
-                    pieces.append((before, -before.length))
-        return pieces
+            for source in self.network.sources.get(origin, ()):
+                before = charts[source, origin, _same_or_first(lane_id, graph[source][origin])]
+                pieces.append((before, -before.length))
+        nobody = _Roll()
+        return [(self._rolls.get(piece, nobody), offset) for piece, offset in pieces]
 
     def _collide(self, bodies: list[RoadObject], dt: float) -> None:
         """Run highway-env's collision check on every pair that it could find touching, in its order."""

@@ -81,11 +81,9 @@ def _along(piece: Piece, run: Floats) -> tuple[Floats, Floats, Floats]:
     heading = piece.heading + piece.curvature * run
     half = 0.5 * piece.curvature * run
     chord = run * np.sinc(half / np.pi)
-    return (
-        piece.x + chord * np.cos(piece.heading + half),
-        piece.y + chord * np.sin(piece.heading + half),
-        heading,
-    )
+    x = piece.x + chord * np.cos(piece.heading + half)
+    y = piece.y + chord * np.sin(piece.heading + half)
+    return np.asarray(x, float), np.asarray(y, float), np.asarray(heading, float)
 
 
 class InCarRoad:
@@ -133,7 +131,7 @@ class InCarRoad:
         heading = piece["heading"] + 2 * half
         x = piece["x"] + chord * np.cos(piece["heading"] + half) - d * np.sin(heading)
         y = piece["y"] + chord * np.sin(piece["heading"] + half) + d * np.cos(heading)
-        return x, y
+        return np.asarray(x, float), np.asarray(y, float)
 
     def heading(self, s: ArrayLike) -> Floats:
         """Return the reference line's heading, radians counter-clockwise from east."""
