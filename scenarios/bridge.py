@@ -21,6 +21,7 @@ NEAR_PX = 3.0
 STRETCH = 0.1
 """A vehicle's box is stretched down by this share of its height: the contact shadow is the vehicle's."""
 
+_STEP = np.array([(row, column) for row in (-1, 0, 1) for column in (-1, 0, 1)])
 _REACH = int(np.ceil(NEAR_PX)) + 1
 _ROWS, _COLUMNS = (
     offsets.ravel() for offsets in np.mgrid[-_REACH : _REACH + 1, -_REACH : _REACH + 1].astype(np.int64)
@@ -35,11 +36,13 @@ class Votes:
         ids: (K,) int64, the trace.
         objects: (K,) uint32, id of the object.
         counts: (K,) int64, points.
+        depths: (K,) float64, their median depth, metres along the axis, infinite in the sky.
     """
 
     ids: NDArray[np.int64]
     objects: NDArray[np.uint32]
     counts: NDArray[np.int64]
+    depths: NDArray[np.float64]
 
 
 def tracker_info(camera: Camera, rate: float) -> Info:
@@ -101,12 +104,31 @@ def point_owners(
     return owners
 
 
-def votes(traces: Traces, ids: NDArray[np.uint32], truth: FrameTruth) -> Votes:
-    """Count what the support points of each trace lie on."""
+def votes(
+    traces: Traces, ids: NDArray[np.uint32], depth: NDArray[np.float32], truth: FrameTruth
+) -> Votes:
+    """Count what the support points of each trace lie on, and how far away that is."""
     owners = point_owners(traces.points, ids, truth)
     pairs = np.stack([traces.point_traces, owners.astype(np.int64)], axis=1).reshape(-1, 2)
-    unique, counts = np.unique(pairs, axis=0, return_counts=True)
-    return Votes(ids=unique[:, 0], objects=unique[:, 1].astype(np.uint32), counts=counts.astype(np.int64))
+    unique, group, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    depths = point_depths(traces.points, depth)
+    order = np.lexsort((depths, group.reshape(-1)))
+    middles = np.cumsum(counts) - counts + (counts - 1) // 2
+    return Votes(
+        ids=unique[:, 0],
+        objects=unique[:, 1].astype(np.uint32),
+        counts=counts.astype(np.int64),
+        depths=depths[order][middles],
+    )
+
+
+def point_depths(points: NDArray[np.float64], depth: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Give the least depth (K,) within a pixel of image points (K, 2): an edge is the nearer thing's."""
+    height, width = depth.shape
+    columns = points[:, 0, None].astype(np.int64) + _STEP[:, 1]
+    rows = points[:, 1, None].astype(np.int64) + _STEP[:, 0]
+    near = depth[rows.clip(0, height - 1), columns.clip(0, width - 1)]
+    return np.asarray(near.min(axis=1, initial=np.inf), np.float64)
 
 
 def _nearest_vehicle(

@@ -175,7 +175,7 @@ class TrackerLog:
             traces = _copied(diagnostics.traces)
             _digest(self.digest, traces)
             if observation is not None:
-                votes = bridge.votes(traces, observation.ids, observation.truth)
+                votes = bridge.votes(traces, observation.ids, observation.depth, observation.truth)
                 self.traces.add(frame.tick, traces, votes)
         self.log_ms.append(_milliseconds_since(started))
         return tracks, diagnostics
@@ -200,6 +200,7 @@ class _TraceRows:
             "vote_ids": votes.ids,
             "vote_objects": votes.objects,
             "vote_counts": votes.counts,
+            "vote_depths": votes.depths,
         }
         for name, column in columns.items():
             self._columns.setdefault(name, []).append(column)

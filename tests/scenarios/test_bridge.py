@@ -93,7 +93,7 @@ def test_votes_count_points_by_trace_and_object():
         points=np.array([[18.0, 25.0], [2.0, 40.0], [19.0, 26.0], [60.0, 2.0]]),
         point_traces=np.array([7, 9, 7, 7]),
     )
-    votes = bridge.votes(traces, observation.ids, observation.truth)
+    votes = bridge.votes(traces, observation.ids, observation.depth, observation.truth)
     rows = list(zip(votes.ids.tolist(), votes.objects.tolist(), votes.counts.tolist(), strict=True))
     assert rows == [(7, 0, 1), (7, CAR, 2), (9, 1, 1)]
 
@@ -105,7 +105,7 @@ def test_no_points_no_votes():
         ids=none, x=np.zeros(0), v=np.zeros(0), labels=np.zeros(0, np.uint8), p_car=np.zeros(0), owners=none,
         points=np.zeros((0, 2)), point_traces=none,
     )  # fmt: skip
-    assert len(bridge.votes(traces, observation.ids, observation.truth).ids) == 0
+    assert len(bridge.votes(traces, observation.ids, observation.depth, observation.truth).ids) == 0
 
 
 def test_the_tracker_is_told_the_camera_and_gets_odometry_only_on_request():
