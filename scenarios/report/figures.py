@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scenarios.log import EpisodeLog
 from scenarios.report import plots
 from scenarios.report.history import TraceSamples
-from scenarios.report.palette import CLASSES
+from scenarios.report.palette import CLASSES, SERIES
 from scenarios.report.plots import Plot
 from scenarios.report.series import Series, measure
 from scenarios.score.params import Boxes
@@ -67,7 +67,7 @@ def draw(recording: Recording, *, log: EpisodeLog | None, boxes: Boxes, scenario
 
 
 def _profiles(recording: Recording, samples: TraceSamples) -> list[Plot]:
-    images = recording.history.profiles()
+    images = {name: image for name, image in recording.history.profiles().items() if image.any()}
     names = sorted(images, key=lambda name: name != "segments")[:MAX_PROFILES]
     drawn = []
 
@@ -95,8 +95,8 @@ def _profiles(recording: Recording, samples: TraceSamples) -> list[Plot]:
 def _by_class(samples: TraceSamples, series: Series | None) -> dict[str, NDArray[np.bool_]]:
     """Return which samples are of each true class, in the classes' own order; without truth all are one."""
     if series is None:
-        return {"ignored": np.ones(len(samples.ids), bool)} if len(samples.ids) else {}
-    names = np.array([series.classes.get(int(trace), "ignored") for trace in samples.ids], dtype=object)
+        return {"all": np.ones(len(samples.ids), bool)}
+    names = np.array([series.classes.get(int(trace)) for trace in samples.ids], dtype=object)
     masks = {name: names == name for name in CLASSES}
     return {name: mask for name, mask in masks.items() if mask.any()}
 
@@ -213,9 +213,6 @@ def _belief(
 ) -> tuple[str, str, tuple[Any, plots.TimeAxis]]:
     """Draw p(car) of the traces by true class over time, in windows of half a second."""
     masks = _by_class(samples, series)
-    if series is None:
-        masks = {"all": np.ones(len(samples.ids), bool)}
-    masks = {name: mask for name, mask in masks.items() if name != "ignored"}
     edges = np.arange(0.0, seconds + _WINDOW, _WINDOW)
     window = np.digitize(samples.ticks / recording.rate, edges) - 1
     quartiles = {}
@@ -226,11 +223,10 @@ def _belief(
             if len(values):
                 rows[:, w] = np.quantile(values, (0.25, 0.5, 0.75))
         quartiles[name] = ((edges[:-1] + edges[1:]) / 2, rows[0], rows[1], rows[2])
-    colours = {**CLASSES, "all": "#3b82f6"}
     return (
         "Belief in a car",
         "p(car) of the traces"
         + (" by what they truly are" if series is not None else "")
         + ": medians and quartiles over half a second.",
-        plots.bands(quartiles, seconds=seconds, label="p(car)", colours=colours),
+        plots.bands(quartiles, seconds=seconds, label="p(car)", colours={**CLASSES, "all": SERIES[0]}),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import IO, Any
@@ -15,8 +15,19 @@ from markupsafe import Markup
 from scenarios.log import EpisodeLog
 from scenarios.report import figures
 from scenarios.report.history import History
-from scenarios.report.palette import CLASSES, LABELS
-from scenarios.report.tables import TILES, Row, number, plain_rows, score_row, words
+from scenarios.report.palette import CLASSES, LABELS, NO_TRACK
+from scenarios.report.tables import (
+    BOX_SCORES,
+    MEANINGS,
+    TILE_COUNT,
+    TILES,
+    Row,
+    is_group,
+    number,
+    plain_rows,
+    score_row,
+    words,
+)
 from scenarios.score.params import ScoringParams
 
 _FILM_MARKER = "<film>"  # text from outside is escaped, so that it cannot hold this
@@ -78,6 +89,7 @@ class Table:
 
     title: str
     rows: list[Row]
+    note: str = ""
 
 
 def environment() -> Environment:
@@ -128,9 +140,10 @@ def write_page(
             has_truth=log is not None,
             label_colours=[(label.name.lower(), colour) for label, colour in LABELS.items()],
             map_colours=[(name, CLASSES[name]) for name in drawn.classes],
+            no_track=NO_TRACK,
             tiles=_tiles(values, has_boxes=has_boxes, has_traces=has_traces),
             tables=_tables(values, has_boxes=has_boxes, has_traces=has_traces),
-            confusion=_confusion(values),
+            confusion=confusion(values),
             difficulty=plain_rows(document.get("difficulty") or {}),
             profiles=drawn.profiles,
             maps=drawn.maps,
@@ -185,46 +198,51 @@ def _chips(
     return chips
 
 
-def _leaves(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the scores of all groups by name."""
-    found: dict[str, Any] = {}
-    for name, value in values.items():
-        if isinstance(value, Mapping) and "mean" not in value:
-            found |= {inner: leaf for inner, leaf in value.items() if inner != "confusion"}
-        else:
-            found[name] = value
-    return found
-
-
 def _tiles(values: Mapping[str, Any], *, has_boxes: bool, has_traces: bool) -> list[Row]:
-    leaves = _leaves(values)
+    """Return the scores that the page begins with: those of them that this tracker can have."""
+    leaves = dict(values) | dict(values.get("identification") or {})
+    names = [name for name in TILES if name in leaves and (has_boxes if name in BOX_SCORES else has_traces)]
     return [
         score_row(name, leaves[name], has_boxes=has_boxes, has_traces=has_traces)
-        for name in TILES
-        if name in leaves
+        for name in names[:TILE_COUNT]
     ]
 
 
 def _tables(values: Mapping[str, Any], *, has_boxes: bool, has_traces: bool) -> list[Table]:
-    plain: list[Row] = []
-    groups = []
-    for name, value in values.items():
-        if isinstance(value, Mapping) and "mean" not in value:
-            rows = []
-            for inner, leaf in value.items():
-                if inner == "confusion":
-                    continue
-                nested = leaf.items() if isinstance(leaf, Mapping) and "mean" not in leaf else [("", leaf)]
-                for key, item in nested:
-                    row = score_row(inner, item, has_boxes=has_boxes, has_traces=has_traces)
-                    title = f"{row.name}: {words(key)}" if key else row.name
-                    rows.append(
-                        Row(name=title, text=row.text, exact=row.exact, note=row.note, missing=row.missing)
-                    )
-            groups.append(Table(words(name).capitalize(), rows))
-        else:
-            plain.append(score_row(name, value, has_boxes=has_boxes, has_traces=has_traces))
-    return ([Table("Tracking", plain)] if plain else []) + groups
+    """Return a table of the plain scores, one of each group, and one of each group of scores in a group."""
+
+    def row(name: str, value: object) -> Row:
+        return score_row(name, value, has_boxes=has_boxes, has_traces=has_traces)
+
+    plain = {name: value for name, value in values.items() if not is_group(value)}
+    tables = [_table("Tracking", [row(name, value) for name, value in plain.items()])] if plain else []
+    for name, group in values.items():
+        if not is_group(group):
+            continue
+        rows, inner = [], []
+        for key, value in group.items():
+            if not is_group(value):
+                rows.append(row(key, value))
+            elif MEANINGS.keys() & value.keys():
+                title = f"{words(name).capitalize()}, {words(key)}"
+                inner.append(_table(title, [row(*item) for item in value.items()], MEANINGS.get(key, "")))
+            elif key != "confusion":
+                rows += [
+                    replace(row(key, item), name=f"{words(key)}: {words(which)}")
+                    for which, item in value.items()
+                ]
+        tables += [_table(words(name).capitalize(), rows), *inner]
+    return tables
+
+
+def _table(title: str, rows: list[Row], note: str = "") -> Table:
+    """Return a table; what is missing throughout for one reason is said once."""
+    notes = {row.note for row in rows}
+    if rows and all(row.missing for row in rows) and len(notes) == 1:
+        return Table(title, [replace(row, note="") for row in rows], f"{notes.pop().capitalize()}.")
+    return Table(
+        title, [replace(row, note="") for row in rows] if note else rows, note and f"{note.capitalize()}."
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +252,7 @@ class _Cell:
     share: float
 
 
-def _confusion(values: Mapping[str, Any]) -> dict[str, Any] | None:
+def confusion(values: Mapping[str, Any]) -> dict[str, Any] | None:
     """Return the confusion matrix as rows of truth and columns of labels, shaded by the share of its row."""
     matrix = (values.get("identification") or {}).get("confusion")
     if not matrix:

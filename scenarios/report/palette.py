@@ -15,8 +15,11 @@ IDENTITIES = (
 LABELS = {Label.CAR: "#ef4444", Label.BACKGROUND: "#22a06b", Label.UNDECIDED: "#9aa0aa"}
 """Of traces, by what the tracker takes them for."""
 
-CLASSES = {"car": "#ef4444", "background": "#22a06b", "oncoming": "#7c6cf2", "ignored": "#9aa0aa"}
-"""Of traces, by what they truly are (scoring.md 8)."""
+CLASSES = {"car": "#ef4444", "background": "#22a06b", "oncoming": "#7c6cf2"}
+"""Of scored traces, by what they truly are."""
+
+NO_TRACK = "#6b7280"
+"""Of traces that belong to no track."""
 
 SERIES = ("#3b82f6", "#f59e0b", "#10b981", "#a855f7", "#ef4444", "#06b6d4")
 """Of lines in plots that are neither."""

@@ -19,10 +19,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from scenarios.report.history import TraceSamples
-from scenarios.report.palette import CLASSES, LABELS, SERIES, identity
+from scenarios.report.palette import CLASSES, LABELS, NO_TRACK, SERIES, identity
 from tracker.types import Label
 
 Floats = NDArray[np.float64]
+
+Estimate = tuple[float, float, float]
+"""A value, and where its 95 % interval begins and ends."""
 
 _INK, _RULE = "#010203", "#010204"  # stand-ins: the page's own ink and rules take their place
 _STYLE: dict[str, object] = {
@@ -107,10 +110,11 @@ def profile(
         axes.grid(visible=False)
         axes.set_facecolor("#101216")
         if image.size:
-            bright = max(float(np.quantile(image, 0.995)), 1.0)
+            dark, bright = np.quantile(image, (0.01, 0.995))
+            shades = np.clip((image - dark) / max(float(bright - dark), 1.0), 0.0, 1.0)
             extent = (0.0, float(width), len(image) * stride / rate, 0.0)
             axes.imshow(
-                (image / bright) ** 0.7,
+                shades**0.8,
                 cmap="gray",
                 vmin=0,
                 vmax=1.6 if colour else 1,
@@ -151,7 +155,7 @@ def _paths(
         if by_label:
             colours.append(LABELS[Label(int(key[begin]))])
         else:
-            colours.append(identity(int(key[begin])) if key[begin] else "#59606b")
+            colours.append(identity(int(key[begin])) if key[begin] else NO_TRACK)
     return segments, colours
 
 
@@ -223,7 +227,7 @@ def _finish_map(
     for name, (x, v) in samples.items():
         # White beneath the colour: a dot has to be seen on every shade of the map.
         axes.scatter(x, v, s=5, color="white", linewidths=0, rasterized=True, zorder=3)
-        axes.scatter(x, v, s=2.5, color=CLASSES[name], linewidths=0, rasterized=True, zorder=4)
+        axes.scatter(x, v, s=2.5, color=CLASSES.get(name, SERIES[0]), linewidths=0, rasterized=True, zorder=4)
     axes.grid(visible=False)
     axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="x from the principal point, px", ylabel="v, px/s")
     bar = axes.figure.colorbar(image, ax=axes, pad=0.02, fraction=0.05)  # type: ignore[arg-type]
@@ -303,6 +307,35 @@ def stacked(
         _finish_lines(axes, seconds, label, (0, top), legend=True)
 
     return _over_time(draw, seconds)
+
+
+def estimates(rows: Mapping[str, Sequence[Estimate | None]], names: Sequence[str]) -> Markup:
+    """Draw fractions with their intervals, a row a score and a dot for each of ``names``.
+
+    Args:
+        rows: Value, low and high, or None, in the order of ``names``, by score.
+        names: Of what is compared.
+    """
+    spread = 0.52 / max(1, len(names))
+
+    def draw(axes: Axes) -> None:
+        for k in range(len(names)):
+            found = [(row, items[k]) for row, items in enumerate(rows.values())]
+            colour = SERIES[k % len(SERIES)]
+            for row, item in found:
+                if item is None:
+                    continue
+                y = row + (k - (len(names) - 1) / 2) * spread
+                axes.plot(item[1:], [y, y], color=colour, linewidth=1.6, solid_capstyle="round")
+                axes.plot([item[0]], [y], marker="o", markersize=4.5, color=colour)
+        lows = [item[1] for items in rows.values() for item in items if item is not None]
+        axes.set(xlim=(min(0.0, *lows, -0.01), 1.02), ylim=(len(rows) - 0.4, -0.6))
+        axes.set_yticks(range(len(rows)), list(rows))
+        axes.tick_params(axis="y", length=0)
+        axes.grid(visible=False, axis="y")
+        axes.spines["left"].set_visible(False)
+
+    return _draw(draw, size=(4.6, 0.6 + 0.34 * len(rows)))[0]
 
 
 def _finish_lines(

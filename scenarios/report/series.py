@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from scenarios.log import EpisodeLog, TraceLog
+from scenarios.log import EpisodeLog
+from scenarios.score.identification import judge_traces
 from scenarios.score.params import Boxes, ScoringParams
 from scenarios.score.preprocess import box_sequence, select
 from sim.truth.types import FrameTruth
-from sim.world import FIRST_VEHICLE_ID, Role
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ class Series:
         matched: (T,) of them that a confirmed track lies on.
         false: (T,) confirmed tracks that lie on none.
         overlap: (T,) mean IoU of the matches, not a number where there are none.
-        classes: True class of each trace by its id (scoring.md 8).
+        classes: What each trace truly is, by its id.
     """
 
     scored: Floats
@@ -64,29 +64,5 @@ def measure(log: EpisodeLog, *, boxes: Boxes = "amodal") -> Series:
         matched=rows[:, 1],
         false=rows[:, 2],
         overlap=rows[:, 3],
-        classes={} if log.traces is None else trace_classes(log.traces, log.truth),
+        classes={trace.id: trace.truth for trace in judge_traces(log, params)},
     )
-
-
-def trace_classes(traces: TraceLog, truths: tuple[FrameTruth, ...]) -> dict[int, str]:
-    """Return what each trace truly is: that on which most of its support points lay over its life."""
-    roles = {
-        int(vehicle): Role(int(role))
-        for truth in truths
-        for vehicle, role in zip(truth.ids, truth.roles, strict=True)
-    }
-    names = {Role.SAME_WAY: "car", Role.ONCOMING: "oncoming", Role.CROSSING: "ignored"}
-    votes: dict[int, dict[str, int]] = {}
-    for trace, thing, count in zip(
-        traces.vote_ids.tolist(), traces.vote_objects.tolist(), traces.vote_counts.tolist(), strict=True
-    ):
-        role = roles.get(thing, Role.PARKED) if thing >= FIRST_VEHICLE_ID else Role.NONE
-        tally = votes.setdefault(trace, {})
-        name = names.get(role, "background")
-        tally[name] = tally.get(name, 0) + count
-    return {
-        trace: max(tally, key=lambda name: (tally[name], name))
-        if max(tally.values()) >= ScoringParams().majority * sum(tally.values())
-        else "ignored"
-        for trace, tally in votes.items()
-    }

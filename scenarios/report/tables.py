@@ -19,19 +19,33 @@ MEANINGS = {
     "car_recall": "car traces finally labelled car",
     "background_recall": "background traces finally labelled background",
     "accuracy": "scored traces finally labelled right",
+    "balanced_accuracy": "mean of the two recalls",
     "median_seconds_to_identify": "from a car trace's first frame until its label stays right",
+    "never_identified": "car traces whose label never stayed right",
     "vehicle_coverage": "same-way vehicles, seen for 2 s or more, that carry a trace labelled car",
     "traces_per_10s": "how much was dared",
     "oncoming_as_car": "oncoming traces labelled car",
+    "moving": "traces during which the camera car went 10 m or more",
 }
 """What each score says, in a line."""
 
-TILES = ("hota", "idf1", "mota", "car_recall", "background_recall", "median_seconds_to_identify")
-"""The scores that the page begins with."""
+TILES = (
+    "hota",
+    "idf1",
+    "mota",
+    "car_recall",
+    "background_recall",
+    "median_seconds_to_identify",
+    "balanced_accuracy",
+    "vehicle_coverage",
+    "never_identified",
+)
+TILE_COUNT = 6
+"""The page begins with the first so many of these scores that a tracker can have."""
 
-_BOXES = ("hota", "deta", "assa", "mota", "idf1", "id_switches", "precision", "recall")
-_TRACES = ("car_recall", "background_recall", "accuracy", "vehicle_coverage", "oncoming_as_car")
-FRACTIONS = frozenset(_BOXES + _TRACES) - {"id_switches"}
+BOX_SCORES = ("hota", "deta", "assa", "mota", "idf1", "id_switches", "precision", "recall")
+_TRACES = ("car_recall", "background_recall", "accuracy", "balanced_accuracy", "vehicle_coverage")
+FRACTIONS = frozenset(BOX_SCORES + _TRACES) - {"id_switches"}
 """The scores that a bar is drawn for."""
 
 DASH = "–"
@@ -70,7 +84,7 @@ def number(value: object) -> str:
         if not isfinite(value):
             return DASH
         return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
-    if isinstance(value, Mapping) and "mean" in value:
+    if isinstance(value, Mapping):
         return number(value["mean"])
     if isinstance(value, Sequence) and not isinstance(value, str):
         return ", ".join(number(item) for item in value) or DASH
@@ -85,10 +99,15 @@ def words(name: str) -> str:
     return special.get(name) or name.replace("_", " ").replace("-", " ")
 
 
+def is_group(value: object) -> bool:
+    """Tell several scores under one name from a score, which over several seeds is a mapping too."""
+    return isinstance(value, Mapping) and "ci95" not in value
+
+
 def flat(values: Mapping[str, Any], prefix: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Yield the leaves of nested mappings with the keys that lead there."""
     for key, value in values.items():
-        if isinstance(value, Mapping) and "mean" not in value:
+        if is_group(value):
             yield from flat(value, (*prefix, str(key)))
         else:
             yield (*prefix, str(key)), value
@@ -111,7 +130,7 @@ def score_row(name: str, value: object, *, has_boxes: bool, has_traces: bool) ->
 
 
 def _why_null(name: str, *, has_boxes: bool, has_traces: bool) -> str:
-    if name in _BOXES:
+    if name in BOX_SCORES:
         return "nothing to score" if has_boxes else "this tracker gives no boxes"
     if not has_traces:
         return "this tracker shows no traces"
