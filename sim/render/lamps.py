@@ -19,7 +19,7 @@ HALO = np.dtype([("position", "<f4", 3), ("radius", "<f4"), ("colour", "<f4", 3)
 """One glare, as the shader reads it: where, relative to the camera; its radius, px; its colour."""
 
 _REACH = 110.0
-_TAIL, _BRAKE = np.array([0.55, 0.02, 0.015]), np.array([1.5, 0.06, 0.04])
+_TAIL, _BRAKE = np.array([0.55, 0.008, 0.006]), np.array([1.5, 0.025, 0.018])
 _HEAD = np.array([1.5, 1.4, 1.2])
 _STREET = np.array([1.0, 0.74, 0.42])
 _HIGH_LAMP_U = 2.0
