@@ -1,0 +1,371 @@
+"""The indexed road against stock highway-env, bit for bit, and the traffic that runs on it."""
+
+import numpy as np
+import pytest
+from highway_env.road.lane import CircularLane, SineLane, StraightLane
+from highway_env.road.road import Road, RoadNetwork
+from highway_env.vehicle.behavior import IDMVehicle
+from highway_env.vehicle.objects import Landmark, Obstacle
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim.drivers import Driver, QuickVehicle
+from sim.indexed_road import IndexedRoad
+from sim.models import Model
+from sim.params import EgoParams, RoadParams, TrafficParams
+from sim.rng import stream
+from sim.roads import build_road
+from sim.traffic import Traffic
+from sim.world import FIRST_VEHICLE_ID, Kind, Lamps, Role
+from tests.benchmarks.traffic import populate, state
+
+RATE = 30
+CATALOGUE = tuple(
+    Model(name=kind.name.lower(), kind=kind, size=size, lods=())
+    for kind, size in (
+        (Kind.TREE, (4.0, 4.0, 9.0)),
+        (Kind.CAR, (4.4, 1.8, 1.45)),
+        (Kind.CAR, (3.9, 1.7, 1.5)),
+        (Kind.VAN, (5.2, 2.0, 2.2)),
+        (Kind.LORRY, (11.5, 2.5, 3.6)),
+        (Kind.BUS, (12.0, 2.5, 3.2)),
+    )
+)
+CASES = {
+    "straight": (RoadParams(), TrafficParams(), EgoParams()),
+    "curve": (RoadParams(curved=True), TrafficParams(), EgoParams()),
+    "stop-and-go": (
+        RoadParams(),
+        TrafficParams(stop_and_go=True, density=35.0, speed=14.0),
+        EgoParams(speed=14.0),
+    ),
+    "dense": (
+        RoadParams(lanes=3, curved=True),
+        TrafficParams(density=28.0, oncoming_density=25.0, speed_spread=5.0),
+        EgoParams(),
+    ),
+}
+
+
+def traffic(case="straight", seed=0, *, seconds=20.0, lights_on=False, **ego):
+    road_params, params, ego_params = CASES[case]
+    ego_params = EgoParams(**{**ego_params.model_dump(), **ego})
+    length = 1.5 * max(ego_params.speed, params.speed) * seconds + 700.0
+    road = build_road(road_params, length, stream(seed, "road"))
+    return Traffic(road, params, ego_params, CATALOGUE, seed=seed, rate=RATE, lights_on=lights_on)
+
+
+# The indexed road against stock highway-env
+
+
+def twins(road, count, *, stock=IDMVehicle, indexed=QuickVehicle, seed=0, connected=True):
+    worlds = []
+    for kind, vehicle in ((Road, stock), (IndexedRoad, indexed)):
+        world = kind(network=road.network, neighbour_vehicles_connected_lanes=connected)
+        populate(road, world, vehicle, count, seed)
+        worlds.append(world)
+    return worlds
+
+
+def assert_equal_runs(worlds, ticks, dt=1 / RATE):
+    changes = 0
+    for _ in range(ticks):
+        for world in worlds:
+            world.act()
+            world.step(dt)
+        stock, indexed = worlds
+        assert state(stock) == state(indexed)
+        for a, b in zip(stock.vehicles, indexed.vehicles, strict=True):
+            assert (a.lane_index, a.target_lane_index, a.crashed) == (
+                b.lane_index,
+                b.target_lane_index,
+                b.crashed,
+            )
+            changes += a.lane_index != a.target_lane_index
+    return changes
+
+
+@pytest.mark.parametrize("vehicle", [IDMVehicle, QuickVehicle])
+@pytest.mark.parametrize(("curved", "count"), [(False, 24), (True, 24)])
+def test_every_trajectory_is_that_of_stock_highway_env(curved, count, vehicle):
+    road = build_road(RoadParams(curved=curved), 1200.0, stream(3, "road"))
+    changes = assert_equal_runs(twins(road, count, indexed=vehicle), 120)
+    assert changes > 0  # lanes were changed while we watched
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("connected", [True, False])
+@pytest.mark.parametrize("count", [20, 50, 100])
+@pytest.mark.parametrize("curved", [False, True])
+def test_long_trajectories_are_those_of_stock_highway_env(curved, count, connected):
+    road = build_road(RoadParams(curved=curved), 2000.0, stream(1, "road"))
+    assert assert_equal_runs(twins(road, count, connected=connected), 500) > 0
+
+
+@pytest.mark.parametrize("vehicle", [IDMVehicle, QuickVehicle])
+def test_collisions_and_obstacles_are_those_of_stock_highway_env(vehicle):
+    road = build_road(RoadParams(curved=True), 900.0, stream(2, "road"))
+    worlds = twins(road, 24, indexed=vehicle)
+    for world in worlds:
+        for s, d in ((150.0, -2.0), (320.0, 2.5), (400.0, -6.0)):
+            x, y = road.to_world(s, d)
+            world.objects.append(Obstacle(world, [float(x), -float(y)]))
+        world.objects.append(Landmark(world, world.vehicles[3].position + 4.0))
+        for number in (0, 4, 8):  # rammed from behind
+            world.vehicles[number].target_speed = world.vehicles[number].speed = 39.0
+            world.vehicles[number].TIME_WANTED = world.vehicles[number].DISTANCE_WANTED = 0.0
+    assert_equal_runs(worlds, 120)
+    assert any(v.crashed for v in worlds[0].vehicles)
+
+
+def test_drivers_are_the_same_on_either_road():
+    road = build_road(RoadParams(curved=True), 900.0, stream(2, "road"))
+    assert_equal_runs(twins(road, 16, stock=Driver, indexed=Driver), 150)
+
+
+def test_a_network_of_other_lanes_is_answered_as_by_stock_highway_env():
+    network = RoadNetwork()
+    for y in (0.0, 4.0):
+        network.add_lane("a", "b", StraightLane([0, y], [150, y]))
+        network.add_lane("b", "c", SineLane([150, y], [300, y], 2.0, 0.05, 0.0))
+    worlds = []
+    for kind, vehicle in ((Road, IDMVehicle), (IndexedRoad, QuickVehicle)):
+        world = kind(network=network, neighbour_vehicles_connected_lanes=True)
+        for i in range(6):
+            world.vehicles.append(vehicle(world, [20.0 * i, 4.0 * (i % 2)], 0.0, 15.0 + i, target_speed=25.0))
+        worlds.append(world)
+    assert_equal_runs(worlds, 120)
+
+
+place = st.tuples(
+    st.one_of(st.floats(-20, 330), st.sampled_from([0.0, 95.0, 100.0, 105.0, 50.0])),
+    st.one_of(st.floats(-12, 12), st.sampled_from([-3.0, -1.0, 0.0, 1.0, 3.0, 4.0])),
+)
+
+
+def small_network():
+    network = RoadNetwork()
+    for lane in range(2):
+        y = 4.0 * lane
+        network.add_lane("a", "b", StraightLane([0, y], [100, y]))
+        network.add_lane("b", "c", CircularLane([100, 60], 60 - y, -np.pi / 2, 0.0))
+        network.add_lane("c", "a", StraightLane([160 - y, 60], [160 - y, 120]))
+    network.add_lane("b", "d", StraightLane([100, 0], [200, 0]))
+    return network
+
+
+@settings(max_examples=150, deadline=None)
+@given(places=st.lists(place, min_size=2, max_size=9), connected=st.booleans(), objects=st.integers(0, 2))
+def test_queries_are_those_of_stock_highway_env(places, connected, objects):
+    network = small_network()
+    worlds = []
+    for kind in (Road, IndexedRoad):
+        world = kind(network=network, neighbour_vehicles_connected_lanes=connected)
+        for x, y in places:
+            world.vehicles.append(IDMVehicle(world, [x, y], 0.1 * (y % 7), 10.0))
+        for x, y in places[:objects]:
+            world.objects.append(Obstacle(world, [x + 3.0, y]))
+        worlds.append(world)
+
+    def number(world, found):
+        return [
+            next((i for i, b in enumerate([*world.vehicles, *world.objects]) if b is f), None) for f in found
+        ]
+
+    for i in range(len(places)):
+        stock, indexed = (w.vehicles[i] for w in worlds)
+        assert stock.lane_index == indexed.lane_index
+        for index in network.lanes_dict():
+            found = [number(w, w.neighbour_vehicles(w.vehicles[i], index)) for w in worlds]
+            assert found[0] == found[1]
+        for options in ({}, {"count": 2}, {"see_behind": False}, {"sort": False, "vehicles_only": True}):
+            near = [number(w, w.close_objects_to(w.vehicles[i], 30.0, **options)) for w in worlds]
+            assert near[0] == near[1]
+
+
+# The traffic
+
+
+def test_no_class_state_leaks_between_worlds():
+    import gymnasium
+
+    def run(disturb):
+        run_of = traffic("curve", 4)
+        if disturb:
+            before = (IDMVehicle.COMFORT_ACC_MAX, IDMVehicle.DISTANCE_WANTED)
+            env = gymnasium.make("intersection-v1")
+            env.reset(seed=0)
+            env.step(env.action_space.sample() * 0)
+            env.close()
+            assert before != (IDMVehicle.COMFORT_ACC_MAX, IDMVehicle.DISTANCE_WANTED)
+        for _ in range(60):
+            run_of.step()
+        return run_of.vehicles().positions.tobytes()
+
+    saved = {name: getattr(IDMVehicle, name) for name in dir(IDMVehicle) if name.isupper()}
+    import highway_env
+
+    highway_env._register_highway_envs()
+    try:
+        undisturbed = run(disturb=False)
+        assert run(disturb=True) == undisturbed
+        assert run(disturb=False) == undisturbed  # and one that is built afterwards
+    finally:
+        for name, value in saved.items():
+            setattr(IDMVehicle, name, value)
+
+
+@pytest.mark.parametrize("case", ["curve", "stop-and-go"])
+def test_the_same_seed_gives_the_same_drive_and_another_seed_another(case):
+    def drive(seed):
+        run = traffic(case, seed, seconds=5.0)
+        for _ in range(5):
+            run.step()
+        bodies = run.vehicles()
+        return b"".join(a.tobytes() for a in (bodies.ids, bodies.positions, bodies.yaws, bodies.colours))
+
+    assert drive(1) == drive(1)
+    assert drive(1) != drive(2)
+
+
+def drive_without_collision(case, seed, seconds=20.0):
+    """Drive, and return how often somebody was ahead within 60 m, and the ego's states."""
+    run = traffic(case, seed, seconds=seconds)
+    ahead, egos = 0, [run.ego()]
+    for _ in range(int(seconds * RATE)):
+        run.step()
+        assert not run.collided
+        ego, bodies = run.ego(), run.vehicles()
+        egos.append(ego)
+        away = (bodies.positions - ego.position)[:, :2] @ [np.cos(ego.yaw), np.sin(ego.yaw)]
+        ahead += np.any((bodies.roles == Role.SAME_WAY) & (away > 0) & (away < 60))
+    return ahead / (seconds * RATE), egos
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_drive_has_cars_ahead_and_no_collision(case):
+    ahead, egos = drive_without_collision(case, 0, seconds=5.0)
+    assert ahead > 0.5
+    yaw = np.unwrap([e.yaw for e in egos])
+    rates = np.array([e.yaw_rate for e in egos])
+    speeds = np.array([e.speed for e in egos])
+    assert np.allclose(-np.diff(yaw) * RATE, rates[1:], atol=1e-9)  # positive turns to the right
+    assert np.abs(rates * speeds).max() < 3.0  # m/s^2 sideways
+    path = np.array([e.position[:2] for e in egos])
+    run = np.hypot(*np.diff(path, axis=0).T) * RATE
+    assert np.allclose(run, speeds[:-1], atol=0.3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_twenty_seeds_drive_without_collision(case):
+    assert np.mean([drive_without_collision(case, seed)[0] for seed in range(20)]) > 0.8
+
+
+def test_stop_and_go_stops_and_goes():
+    run = traffic("stop-and-go", 0)
+    speeds, braking = [], False
+    for _ in range(20 * RATE):
+        run.step()
+        speeds.append(run.ego().speed)
+        bodies = run.vehicles()
+        braking |= bool(np.any(bodies.lamps & Lamps.BRAKE))
+    assert min(speeds) < 0.5
+    assert max(speeds) > 5.0
+    assert braking
+    assert min(speeds) >= 0.0
+
+
+def test_bodies_are_whole_and_stand_where_they_should():
+    road_params = RoadParams(lanes=1, oncoming_lanes=1, median=0.0, curved=True)
+    road = build_road(road_params, 1200.0, stream(0, "road"))
+    params = TrafficParams(parked=40.0, density=18.0, speed=13.0)
+    run = Traffic(road, params, EgoParams(speed=13.0), CATALOGUE, seed=0, rate=RATE, lights_on=True)
+    ids: dict[int, tuple[int, int]] = {}
+    for _ in range(150):
+        run.step()
+        bodies = run.vehicles()
+        assert len(np.unique(bodies.ids)) == len(bodies)
+        assert bodies.ids.min() >= FIRST_VEHICLE_ID
+        for number, kind, model in zip(bodies.ids.tolist(), bodies.kinds, bodies.models, strict=True):
+            assert ids.setdefault(number, (kind, model)) == (kind, model)
+    assert np.array_equal(bodies.sizes, [CATALOGUE[m].size for m in bodies.models])
+    assert [CATALOGUE[m].kind for m in bodies.models] == bodies.kinds.tolist()
+    s, d = road.locate(bodies.positions[:, 0], bodies.positions[:, 1])
+    same, coming, parked = (bodies.roles == r for r in (Role.SAME_WAY, Role.ONCOMING, Role.PARKED))
+    assert same.any()
+    assert coming.any()
+    assert np.all(np.abs(d[same] + 1.8) < 0.6)
+    assert np.all(np.abs(d[coming] - 1.8) < 0.6)
+    assert np.all(np.abs(d[parked]) - bodies.sizes[parked, 1] / 2 > 3.6 + 0.3)
+    assert (d[parked] < 0).any()
+    assert (d[parked] > 0).any()
+    along = np.cos(bodies.yaws - road.heading(s))
+    assert np.all(np.sign(along) == np.where(d < 0, 1, -1))
+    assert not bodies.velocities[parked].any()
+    moving = np.einsum(
+        "ij,ij->i", bodies.velocities[:, :2], np.stack([np.cos(bodies.yaws), np.sin(bodies.yaws)]).T
+    )
+    assert np.all(moving[~parked] >= 0)
+    assert np.all(bodies.lamps[~parked] & (Lamps.TAIL | Lamps.HEAD) == Lamps.TAIL | Lamps.HEAD)
+    assert np.all((bodies.colours >= 0) & (bodies.colours <= 1))
+
+
+def test_vehicles_appear_and_vanish_far_away():
+    run = traffic("straight", 3, seconds=30.0)
+    bodies = run.vehicles()
+    known = dict(zip(bodies.ids.tolist(), bodies.positions, strict=True))
+    for _ in range(20 * RATE):
+        run.step()
+        bodies, ego = run.vehicles(), run.ego()
+        now = dict(zip(bodies.ids.tolist(), bodies.positions, strict=True))
+        for number in now.keys() ^ known.keys():
+            away = (now.get(number, known.get(number)) - ego.position) @ [np.cos(ego.yaw), np.sin(ego.yaw), 0]
+            assert away > 400 or away < -100
+        known = now
+
+
+def test_the_ego_obeys_actions():
+    run = traffic("straight", 5, driver="actions", speed=15.0)
+    start = run.ego()
+    for _ in range(15):
+        run.step(np.array([1.0, 0.0], np.float32))
+    faster = run.ego()
+    assert faster.speed == pytest.approx(start.speed + 1.5, abs=0.02)
+    for _ in range(10):
+        run.step(np.array([0.0, 0.5], np.float32))
+    turned = run.ego()
+    assert turned.yaw_rate == pytest.approx(0.2)
+    assert turned.yaw < faster.yaw  # to the right
+    for _ in range(15):
+        run.step(np.array([-1.0, 0.0], np.float32))
+    assert run.ego().speed == pytest.approx(faster.speed - 3.5, abs=0.02)
+
+
+def test_the_ego_follows_a_profile():
+    run = traffic("curve", 6, driver="profile", speed=12.0)
+    offsets = []
+    for _ in range(10 * RATE):
+        run.step()
+        ego = run.ego()
+        offsets.append(run._road.locate(*ego.position[:2])[1])
+        assert not run.collided
+    assert 0.2 < np.ptp(offsets) < 1.0
+
+
+def test_impossible_traffic_is_an_error():
+    road = build_road(RoadParams(), 900.0, stream(0, "road"))
+    with pytest.raises(ValueError, match=r"ego\.lane"):
+        Traffic(road, TrafficParams(), EgoParams(lane=2), CATALOGUE, seed=0, rate=RATE)
+    with pytest.raises(ValueError, match="car"):
+        Traffic(road, TrafficParams(), EgoParams(), CATALOGUE[:1], seed=0, rate=RATE)
+    with pytest.raises(ValueError, match="more than 1"):
+        Traffic(road, TrafficParams(vans=0.6, lorries=0.6), EgoParams(), CATALOGUE, seed=0, rate=RATE)
+
+
+def test_an_empty_road_has_no_traffic():
+    road = build_road(RoadParams(oncoming_lanes=0), 900.0, stream(0, "road"))
+    run = Traffic(road, TrafficParams(density=0.0), EgoParams(), CATALOGUE, seed=0, rate=RATE)
+    run.step()
+    assert len(run.vehicles()) == 0
+    assert run.ego().speed == pytest.approx(20.0, abs=0.5)
