@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from sim.truth.types import FrameTruth
@@ -22,10 +23,6 @@ STRETCH = 0.1
 """A vehicle's box is stretched down by this share of its height: the contact shadow is the vehicle's."""
 
 _STEP = np.array([(row, column) for row in (-1, 0, 1) for column in (-1, 0, 1)])
-_REACH = int(np.ceil(NEAR_PX)) + 1
-_ROWS, _COLUMNS = (
-    offsets.ravel() for offsets in np.mgrid[-_REACH : _REACH + 1, -_REACH : _REACH + 1].astype(np.int64)
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,34 +86,23 @@ def point_owners(
     Returns:
         (K,) object ids.
     """
-    height, width = ids.shape
-    x = np.clip(points[:, 0], 0.0, np.nextafter(width, 0))
-    y = np.clip(points[:, 1], 0.0, np.nextafter(height, 0))
-    column, row = x.astype(np.int64), y.astype(np.int64)
-    owners = ids[row, column]
-
-    open_points = np.flatnonzero(owners < FIRST_VEHICLE_ID)
-    if len(open_points) and len(truth):
-        near = _nearest_vehicle(x[open_points], y[open_points], ids)
-        boxed = _boxed_vehicle(x[open_points], y[open_points], truth)
-        found = np.where(near > 0, near, boxed)
-        owners[open_points] = np.where(found > 0, found, owners[open_points])
+    owners: NDArray[np.uint32] = _owners(
+        np.ascontiguousarray(points, np.float64), ids, truth.ids, truth.box_visible, truth.distances
+    )
     return owners
 
 
-def votes(
-    traces: Traces, ids: NDArray[np.uint32], depth: NDArray[np.float32], truth: FrameTruth
-) -> Votes:
+def votes(traces: Traces, ids: NDArray[np.uint32], depth: NDArray[np.float32], truth: FrameTruth) -> Votes:
     """Count what the support points of each trace lie on, and how far away that is."""
     owners = point_owners(traces.points, ids, truth)
-    pairs = np.stack([traces.point_traces, owners.astype(np.int64)], axis=1).reshape(-1, 2)
-    unique, group, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    pairs = (traces.point_traces.astype(np.int64) << 32) | owners  # traces are few: one word holds both
+    unique, group, counts = np.unique(pairs, return_inverse=True, return_counts=True)
     depths = point_depths(traces.points, depth)
     order = np.lexsort((depths, group.reshape(-1)))
     middles = np.cumsum(counts) - counts + (counts - 1) // 2
     return Votes(
-        ids=unique[:, 0],
-        objects=unique[:, 1].astype(np.uint32),
+        ids=unique >> 32,
+        objects=unique.astype(np.uint32),
         counts=counts.astype(np.int64),
         depths=depths[order][middles],
     )
@@ -131,27 +117,43 @@ def point_depths(points: NDArray[np.float64], depth: NDArray[np.float32]) -> NDA
     return np.asarray(near.min(axis=1, initial=np.inf), np.float64)
 
 
-def _nearest_vehicle(
-    x: NDArray[np.float64], y: NDArray[np.float64], ids: NDArray[np.uint32]
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _owners(
+    points: NDArray[np.float64],
+    ids: NDArray[np.uint32],
+    vehicles: NDArray[np.uint32],
+    boxes: NDArray[np.float64],
+    distances: NDArray[np.float64],
 ) -> NDArray[np.uint32]:
-    """Return the vehicle with the nearest pixel centre within `NEAR_PX`, or 0: (K,)."""
+    """As `point_owners`, with the vehicles' (N,) ids, (N, 4) visible boxes and (N,) distances."""
     height, width = ids.shape
-    rows = y.astype(np.int64)[:, None] + _ROWS
-    columns = x.astype(np.int64)[:, None] + _COLUMNS
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    candidates = ids[rows.clip(0, height - 1), columns.clip(0, width - 1)]
-    squared = (rows + 0.5 - y[:, None]) ** 2 + (columns + 0.5 - x[:, None]) ** 2
-    possible = inside & (candidates >= FIRST_VEHICLE_ID) & (squared <= NEAR_PX**2)
-    best = np.argmin(np.where(possible, squared, np.inf), axis=1)
-    k = np.arange(len(x))
-    return np.where(possible[k, best], candidates[k, best], 0).astype(np.uint32)
-
-
-def _boxed_vehicle(x: NDArray[np.float64], y: NDArray[np.float64], truth: FrameTruth) -> NDArray[np.uint32]:
-    """Return the nearest vehicle in whose stretched visible box each point lies, or 0: (K,)."""
-    x0, y0, x1, y1 = truth.box_visible.T[:, None, :]
-    x, y = x[:, None], y[:, None]
-    # Comparisons with the empty box of an invisible vehicle, not numbers, are false.
-    inside = (x >= x0) & (x < x1) & (y >= y0) & (y < y1 + STRETCH * (y1 - y0))
-    best = np.argmin(np.where(inside, truth.distances, np.inf), axis=1)
-    return np.where(inside.any(axis=1), truth.ids[best], 0).astype(np.uint32)
+    reach = int(np.ceil(NEAR_PX))
+    owners = np.zeros(len(points), np.uint32)
+    for k in range(len(points)):
+        x = min(max(points[k, 0], 0.0), np.nextafter(width, 0))
+        y = min(max(points[k, 1], 0.0), np.nextafter(height, 0))
+        column, row = int(x), int(y)
+        owners[k] = ids[row, column]
+        if owners[k] >= FIRST_VEHICLE_ID:
+            continue
+        nearest = NEAR_PX * NEAR_PX
+        found = False
+        for i in range(max(row - reach, 0), min(row + reach + 1, height)):
+            for j in range(max(column - reach, 0), min(column + reach + 1, width)):
+                squared = (i + 0.5 - y) ** 2 + (j + 0.5 - x) ** 2
+                if ids[i, j] >= FIRST_VEHICLE_ID and (
+                    squared < nearest or (squared == nearest and not found)
+                ):
+                    nearest, found = squared, True
+                    owners[k] = ids[i, j]
+        if found:
+            continue
+        closest = np.inf
+        for n in range(len(vehicles)):
+            x0, y0, x1, y1 = boxes[n]
+            # Comparisons with the box of an invisible vehicle, not numbers, are false.
+            inside = x0 <= x < x1 and y0 <= y < y1 + STRETCH * (y1 - y0)
+            if inside and distances[n] < closest:
+                closest = distances[n]
+                owners[k] = vehicles[n]
+    return owners

@@ -8,7 +8,7 @@ import statistics
 import time
 
 from scenarios import spec
-from scenarios.bridge import info_of, to_frame
+from scenarios.bridge import tracker_frame, tracker_info
 from sim.scenes.in_car import InCarScene
 from sim.simulation import Simulation
 from tracker import registry
@@ -21,11 +21,11 @@ def drive(scenario_name: str, frames: int, seconds: float, report_every: int | N
     tracker = registry.make("in-car")
     laps: dict[str, list[float]] = {}
     with Simulation(scene, scenario.in_car.sensor, seed=0) as simulation:
-        tracker.start(info_of(scene))
+        tracker.start(tracker_info(scene.camera, scenario.rate))
         started = time.perf_counter()
         for observation in simulation.run(frames):
             before = time.perf_counter()
-            tracker.step(to_frame(observation))
+            tracker.step(tracker_frame(observation, odometry=False))
             for stage, ms in observation.timing_ms.items():
                 laps.setdefault(stage, []).append(ms)
             laps.setdefault("track", []).append(1e3 * (time.perf_counter() - before))
