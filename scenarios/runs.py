@@ -110,6 +110,8 @@ def execute(run: Run, directory: Path | None = None, progress: Progress | None =
         document = {"runs": runs, "paired": paired(scores)}
     if directory is not None:
         write_json(directory / "scores.json", document)
+        if len(run.seeds) * len(run.trackers) > 1:
+            _summarise(run, directory, document)
     return document
 
 
@@ -142,6 +144,16 @@ def run_seed(
             if directory is not None:
                 _keep(run, log, documents[log.tracker], recorders[log.tracker])
     return documents
+
+
+def _summarise(run: Run, directory: Path, document: Document) -> None:
+    from scenarios.report.summary import write_summary  # plots: only where a report is wanted
+
+    reports = {
+        name: {seed: run.folder(directory, seed, name) / "report.html" for seed in run.seeds}
+        for name in run.trackers
+    }
+    write_summary(directory, document, reports, description=run.scenario.description)
 
 
 def _recorder(run: Run, seed: int, tracker: str, folder: Path) -> Recorder:

@@ -129,7 +129,7 @@ def profile(
             )
         axes.set(xlim=(0, width), ylim=(seconds, 0), xlabel="x, px", ylabel="time, s")
 
-    svg, (_, y0, _, y1) = _draw(draw, size=(3.7, 4.5))
+    svg, (_, y0, _, y1) = _draw(draw, size=(3.7, 4.5), margins=(0.58, 0.12, 0.44, 0.08))
     return svg, TimeAxis(vertical=True, low=1 - y1, high=1 - y0, seconds=seconds)
 
 
@@ -211,9 +211,15 @@ def likelihoods(
         _finish_map(axes, image, "log₁₀ ratio", samples, extent)
 
     return (
-        ("Background: p(x, v | B)", _draw(density(background), size=(3.7, 3.1))[0]),
-        ("Car: p(x, v | C)", _draw(density(car), size=(3.7, 3.1))[0]),
-        ("Car against background: log ratio", _draw(draw_ratio, size=(3.7, 3.1))[0]),
+        (
+            "Background: p(x, v | B)",
+            _draw(density(background), size=(3.7, 3.1), margins=(0.55, 0.62, 0.44, 0.08))[0],
+        ),
+        ("Car: p(x, v | C)", _draw(density(car), size=(3.7, 3.1), margins=(0.55, 0.62, 0.44, 0.08))[0]),
+        (
+            "Car against background: log ratio",
+            _draw(draw_ratio, size=(3.7, 3.1), margins=(0.55, 0.62, 0.44, 0.08))[0],
+        ),
     )
 
 
@@ -230,7 +236,7 @@ def _finish_map(
         axes.scatter(x, v, s=2.5, color=CLASSES.get(name, SERIES[0]), linewidths=0, rasterized=True, zorder=4)
     axes.grid(visible=False)
     axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="x from the principal point, px", ylabel="v, px/s")
-    bar = axes.figure.colorbar(image, ax=axes, pad=0.02, fraction=0.05)  # type: ignore[arg-type]
+    bar = axes.figure.colorbar(image, ax=axes, pad=0.03, fraction=0.06)  # type: ignore[arg-type]
     bar.set_label(label)
     bar.outline.set_visible(False)
 
@@ -335,7 +341,7 @@ def estimates(rows: Mapping[str, Sequence[Estimate | None]], names: Sequence[str
         axes.grid(visible=False, axis="y")
         axes.spines["left"].set_visible(False)
 
-    return _draw(draw, size=(4.6, 0.6 + 0.34 * len(rows)))[0]
+    return _draw(draw, size=(4.6, 0.5 + 0.34 * len(rows)), margins=(1.25, 0.1, 0.3, 0.05))[0]
 
 
 def _finish_lines(
@@ -343,21 +349,27 @@ def _finish_lines(
 ) -> None:
     axes.set(xlim=(0, seconds), xlabel="time, s", ylabel=label)
     axes.set_ylim(*limits)
-    if legend:
+    if legend and axes.get_legend_handles_labels()[0]:
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=5, handlelength=1.2, borderaxespad=0.1)
 
 
 def _over_time(draw: Callable[[Axes], None], seconds: float) -> tuple[Markup, TimeAxis]:
-    svg, (x0, _, x1, _) = _draw(draw, size=(5.0, 2.1))
+    svg, (x0, _, x1, _) = _draw(draw, size=(5.0, 2.1), margins=(0.56, 0.16, 0.44, 0.24))
     return svg, TimeAxis(vertical=False, low=x0, high=x1, seconds=seconds)
 
 
 def _draw(
-    draw: Callable[[Axes], None], *, size: tuple[float, float]
+    draw: Callable[[Axes], None], *, size: tuple[float, float], margins: tuple[float, float, float, float]
 ) -> tuple[Markup, tuple[float, float, float, float]]:
-    """Return a figure's SVG, and where its axes stand in it: left, bottom, right, top as shares."""
+    """Return a figure's SVG, and where its axes stand in it: left, bottom, right, top as shares.
+
+    ``size`` and ``margins`` (left, right, bottom, top) are inches. They are fixed, since an automatic layout
+    takes as long as the drawing.
+    """
+    (width, height), (left, right, bottom, top) = size, margins
     with rc_context(_STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
+        figure = Figure(figsize=size, dpi=_DPI)
+        figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height)
         axes = figure.subplots()
         draw(axes)
         buffer = io.StringIO()

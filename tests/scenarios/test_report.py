@@ -169,8 +169,8 @@ def test_nulls_say_why(found: list[episode.Step], tmp_path: Path) -> None:
         running.frame(found[0][0], found[0][1])
         page = Page(running.finish(log, document, episode.scenario()).read_text("utf-8"))
     text = " ".join(page.words)
-    assert "this tracker gives no boxes" in text
-    assert "this tracker shows no traces" in text
+    assert "This tracker gives no boxes." in text
+    assert "This tracker shows no traces." in text
 
 
 def test_hostile_names_are_escaped(found: list[episode.Step], tmp_path: Path) -> None:
@@ -213,7 +213,7 @@ def test_failure_while_writing_keeps_the_old_report(
 
     monkeypatch.setattr("scenarios.report.page._write_base64", full_disk)
     with recorder(tmp_path) as running:
-        episode.record(running, found[:5])
+        running.frame(found[0][0], found[0][1])
         with pytest.raises(OSError, match="no space"):
             running.finish(None, None, None)
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
@@ -232,7 +232,8 @@ def test_long_run_is_filmed_in_part(
 ) -> None:
     monkeypatch.setattr("scenarios.report.recorder.FILM_SECONDS", 0.5)
     with recorder(tmp_path) as running:
-        episode.record(running, found)
+        for image, tracks, _, _ in found:
+            running.frame(image, tracks)
         page = Page(running.finish(None, None, None).read_text("utf-8"))
     assert len(decode(page.film())) == 15
     assert "shows the first 0.5 s of 1.5 s" in " ".join(" ".join(page.words).split())
