@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,13 +37,7 @@ class MeshBuilder:
     """A soup of textured triangles in a model's frame: x ahead, y to the left, z up."""
 
     def __init__(self) -> None:
-        self._triangles: list[Floats] = []
-        self._uvs: list[Floats] = []
-        self._surfaces: list[int] = []
-        self._normals: list[Floats | None] = []
-
-    def __len__(self) -> int:
-        return len(self._triangles)
+        self._polygons: dict[int, list[_Polygons]] = {}
 
     def polygon(
         self,
@@ -62,28 +57,42 @@ class MeshBuilder:
             uv: (N, 2) texture coordinates; by default the polygon is laid flat on the texture.
             normals: (N, 3) unit normals; by default those of the faces, smoothed when the mesh is built.
         """
-        corners = np.asarray(points, float)
-        ring = np.roll(corners, -1, axis=0)
-        normal = np.cross(corners - corners[0], ring - corners[0]).sum(axis=0)
-        flip = facing is not None and float(normal @ np.asarray(facing, float)) < 0
-        flat = (
-            planar_uv(corners, -normal if flip else normal, surface) if uv is None else np.asarray(uv, float)
+        self.polygons(
+            np.asarray(points, float)[None],
+            surface,
+            facing=None if facing is None else np.asarray(facing, float)[None],
+            uv=None if uv is None else np.asarray(uv, float)[None],
+            normals=None if normals is None else np.asarray(normals, float)[None],
         )
-        shading = None if normals is None else np.asarray(normals, float)
-        order = np.arange(len(corners))[::-1] if flip else np.arange(len(corners))
-        for i in range(1, len(order) - 1):
-            pick = order[[0, i, i + 1]]
-            if (
-                np.linalg.norm(
-                    np.cross(corners[pick[1]] - corners[pick[0]], corners[pick[2]] - corners[pick[0]])
-                )
-                < 1e-7
-            ):
-                continue
-            self._triangles.append(corners[pick])
-            self._uvs.append(flat[pick])
-            self._surfaces.append(int(surface))
-            self._normals.append(None if shading is None else shading[pick])
+
+    def polygons(
+        self,
+        points: Floats,
+        surface: Surface | NDArray[np.uint8],
+        *,
+        facing: Floats | None = None,
+        uv: Floats | None = None,
+        normals: Floats | None = None,
+    ) -> None:
+        """Add P polygons of N corners at once, as `polygon` adds one.
+
+        Args:
+            points: (P, N, 3).
+            surface: One for all, or (P,).
+            facing: (P, 3).
+            uv: (P, N, 2).
+            normals: (P, N, 3).
+        """
+        count, corners = points.shape[:2]
+        blank = np.full((count, corners, 3), np.nan)
+        batch = _Polygons(
+            points=points,
+            surfaces=np.broadcast_to(np.asarray(surface, np.uint8), count),
+            facing=blank[:, 0] if facing is None else facing,
+            uvs=blank[..., :2] if uv is None else uv,
+            normals=blank if normals is None else normals,
+        )
+        self._polygons.setdefault(corners, []).append(batch)
 
     def decal(self, points: ArrayLike, surface: Surface, *, facing: ArrayLike, lift: float = 0.012) -> None:
         """Add a quadrilateral that lies ``lift`` metres above a surface and shows its texture once.
@@ -143,14 +152,13 @@ class MeshBuilder:
         """
         lattice = np.asarray(points, float)
         rows, columns = lattice.shape[0] - 1, lattice.shape[1] - 1
-        kinds = np.broadcast_to(np.asarray(surface, np.uint8), (rows, columns))
-        within = np.broadcast_to(np.asarray(inside, float), (rows, columns, 3))
-        for i in range(rows):
-            for j in range(columns):
-                quad = lattice[[i, i + 1, i + 1, i], [j, j, j + 1, j + 1]]
-                kind = Surface(int(kinds[i, j]))
-                lens = [(0, 0), (1, 0), (1, 1), (0, 1)] if kind in SHOWN_ONCE else None
-                self.polygon(quad, kind, facing=quad.mean(axis=0) - within[i, j], uv=lens)
+        kinds = np.broadcast_to(np.asarray(surface, np.uint8), (rows, columns)).ravel()
+        within = np.broadcast_to(np.asarray(inside, float), (rows, columns, 3)).reshape(-1, 3)
+        quads = np.stack([lattice[:-1, :-1], lattice[1:, :-1], lattice[1:, 1:], lattice[:-1, 1:]], axis=2)
+        quads = quads.reshape(-1, 4, 3)
+        uvs = np.full((len(quads), 4, 2), np.nan)
+        uvs[np.isin(kinds, SHOWN_ONCE)] = [(0, 0), (1, 0), (1, 1), (0, 1)]
+        self.polygons(quads, kinds, facing=quads.mean(axis=1) - within, uv=uvs)
 
     def prism(
         self,
@@ -185,27 +193,24 @@ class MeshBuilder:
         rim[:, [0, 2]] = np.asarray(centre, float)[[0, 2]] + radius * ring
         faces = {side: rim + np.array([0.0, centre[1] + side * width / 2, 0.0]) for side in (-1, 1)}
         disc = 0.5 + 0.5 * ring / np.abs(ring).max()
-        tread = np.full((4, 2), 0.02)
         self.polygon(faces[outer], Surface.RUBBER, facing=(0, outer, 0), uv=disc)
         self.polygon(faces[-outer], Surface.RUBBER, facing=(0, -outer, 0), uv=np.full((sides, 2), 0.02))
-        for i in range(sides):
-            j = (i + 1) % sides
-            quad = np.stack([faces[-1][i], faces[1][i], faces[1][j], faces[-1][j]])
-            self.polygon(quad, Surface.RUBBER, facing=quad.mean(axis=0) - np.asarray(centre, float), uv=tread)
+        nearer, farther = faces[-1], faces[1]
+        quads = np.stack([nearer, farther, np.roll(farther, -1, axis=0), np.roll(nearer, -1, axis=0)], axis=1)
+        out = quads.mean(axis=1) - np.asarray(centre, float)
+        self.polygons(quads, Surface.RUBBER, facing=out, uv=np.full((sides, 4, 2), 0.02))
 
     def build(self) -> Mesh:
         """Return the mesh: creased normals, equal corners merged."""
-        triangles = np.array(self._triangles)
-        surfaces = np.array(self._surfaces, np.uint8)
+        fans = [_fans(batches) for _, batches in sorted(self._polygons.items())]
+        triangles, surfaces, uvs, given = (np.concatenate(column) for column in zip(*fans, strict=True))
         normals = _creased_normals(triangles, surfaces)
-        for i, given in enumerate(self._normals):
-            if given is not None:
-                normals[i] = given
+        normals = np.where(np.isnan(given), normals, given)
         corners = np.concatenate(
             [
                 triangles.reshape(-1, 3),
                 normals.reshape(-1, 3),
-                np.array(self._uvs).reshape(-1, 2),
+                uvs.reshape(-1, 2),
                 np.repeat(surfaces, 3)[:, None],
             ],
             axis=1,
@@ -221,26 +226,63 @@ class MeshBuilder:
         )
 
 
-def planar_uv(points: Floats, normal: Floats, surface: Surface) -> Floats:
-    """Lay a flat polygon on its texture: u to the right and v up as seen from outside.
+@dataclass(frozen=True, slots=True)
+class _Polygons:
+    """P polygons of N corners: what `MeshBuilder.polygons` was given, nan where it was given nothing."""
 
-    Args:
-        points: (N, 3) metres.
-        normal: (3,) outward, of any length.
-        surface: It decides the scale.
+    points: Floats
+    surfaces: NDArray[np.uint8]
+    facing: Floats
+    uvs: Floats
+    normals: Floats
+
+
+def _fans(batches: Sequence[_Polygons]) -> tuple[Floats, NDArray[np.uint8], Floats, Floats]:
+    """Turn polygons of equally many corners into triangles, counter-clockwise from outside.
 
     Returns:
-        (N, 2) texture coordinates.
+        Corners (T, 3, 3), surfaces (T,), texture coordinates (T, 3, 2), given normals (T, 3, 3) or nan.
     """
-    axis = int(np.argmax(np.abs(normal)))
-    sign = 1.0 if normal[axis] > 0 else -1.0
-    if axis == 0:
-        flat = np.stack([sign * points[:, 1], points[:, 2]], axis=1)
-    elif axis == 1:
-        flat = np.stack([-sign * points[:, 0], points[:, 2]], axis=1)
-    else:
-        flat = np.stack([points[:, 0], sign * points[:, 1]], axis=1)
-    return flat / METRES_PER_REPEAT.get(surface, 1.0)
+    points, surfaces, facing, uvs, normals = (
+        np.concatenate([getattr(batch, name) for batch in batches])
+        for name in ("points", "surfaces", "facing", "uvs", "normals")
+    )
+    arms = points - points[:, :1]
+    outward = np.cross(arms[:, 1:-1], arms[:, 2:]).sum(axis=1)
+    inverted = (outward * np.nan_to_num(facing)).sum(axis=1) < 0
+    outward[inverted] *= -1
+    uvs = np.where(np.isnan(uvs), planar_uv(points, outward, surfaces), uvs)
+    for array in (points, uvs, normals):
+        array[inverted] = array[inverted, ::-1]
+    count = points.shape[1]
+    pick = np.array([(0, i, i + 1) for i in range(1, count - 1)])
+    corners, uvs, normals = (
+        array[:, pick].reshape(-1, 3, array.shape[-1]) for array in (points, uvs, normals)
+    )
+    surfaces = np.repeat(surfaces, count - 2)
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    solid = (area**2).sum(axis=1) > 1e-14
+    return corners[solid], surfaces[solid], uvs[solid], normals[solid]
+
+
+def planar_uv(points: Floats, normals: Floats, surfaces: NDArray[np.uint8]) -> Floats:
+    """Lay flat polygons on their textures: u to the right and v up as seen from outside.
+
+    Args:
+        points: (P, N, 3) metres.
+        normals: (P, 3) outward, of any length.
+        surfaces: (P,) deciding the scale.
+
+    Returns:
+        (P, N, 2) texture coordinates.
+    """
+    axis = np.abs(normals).argmax(axis=1)
+    sign = np.where(np.take_along_axis(normals, axis[:, None], axis=1) > 0, 1.0, -1.0)
+    x, y, z = (points[..., i] for i in range(3))
+    across = np.stack([sign * y, -sign * x, x])[axis, np.arange(len(axis))]
+    up = np.stack([z, z, sign * y])[axis, np.arange(len(axis))]
+    scale = np.array([METRES_PER_REPEAT.get(surface, 1.0) for surface in Surface])[surfaces]
+    return np.asarray(np.stack([across, up], axis=-1) / scale[:, None, None])
 
 
 def _creased_normals(triangles: Floats, surfaces: NDArray[np.uint8]) -> Floats:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim.meshes.builder import Floats, MeshBuilder, scaled_to
+from sim.meshes.builder import Floats, MeshBuilder, planar_uv, scaled_to
 from sim.models import Mesh, Model, Surface
 from sim.rng import stream
 from sim.world import Kind
@@ -96,50 +96,41 @@ def crown(
         points[:, 2] = np.maximum(points[:, 2], 0.0)
         fluff = _unit(corners + rng.normal(0, 0.45, corners.shape))
         shift = rng.uniform(0, 1, 2)
-        for face in faces:
-            uv = _leaf_uv(points[face], corners[face].mean(axis=0)) + shift
-            builder.polygon(points[face], Surface.FOLIAGE, uv=uv, normals=fluff[face])
-    surfaces = np.array([np.prod(radii) ** (2 / 3) for _, radii in blobs])
-    homes = rng.choice(len(blobs), size=3 * leaves, p=surfaces / surfaces.sum())
-    directions = _unit(rng.normal(size=(3 * leaves, 3)))
+        triangles = points[faces]
+        uv = _leaf_uv(triangles, corners[faces].mean(axis=1)) + shift
+        builder.polygons(triangles, Surface.FOLIAGE, uv=uv, normals=fluff[faces])
+    centres, extents = (np.array(column) for column in zip(*blobs, strict=True))
+    weights = np.prod(extents, axis=1) ** (2 / 3)
+    home = rng.choice(len(blobs), size=3 * leaves, p=weights / weights.sum())
+    out = _unit(rng.normal(size=(3 * leaves, 3)))
     rolls = rng.random((3 * leaves, 4))
-    tilts = rng.normal(0, 0.55, (3 * leaves, 3))
-    placed = 0
-    for home, out, roll, tilt in zip(homes, directions, rolls, tilts, strict=True):
-        centre, radii = blobs[home]
-        at = centre + out * radii * (0.82 + 0.20 * roll[0])
-        hidden = any(
-            np.linalg.norm((at - other) / extent) < 0.82
-            for i, (other, extent) in enumerate(blobs)
-            if i != home
-        )
-        if hidden or at[2] < 0.3 * leaf or placed == leaves:
-            continue
-        placed += 1
-        normal = out + tilt
-        normal /= np.linalg.norm(normal)
-        side = np.cross(normal, [0.31, -0.52, 0.80])
-        side /= np.linalg.norm(side)
-        turn = 2 * np.pi * (roll[1] + np.array([0.0, 0.30 + 0.1 * roll[2], 0.66]))
-        size = leaf * (0.7 + 0.6 * roll[3]) * np.array([1.0, 0.62, 0.85])
-        ring = at + size[:, None] * (
-            np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(normal, side)
-        )
-        ring[:, 2] = np.maximum(ring[:, 2], 0.0)
-        shade = np.tile(_unit((out + 0.6 * tilt)[None])[0], (3, 1))
-        builder.polygon(
-            ring, Surface.FOLIAGE, facing=normal, uv=_leaf_uv(ring, normal) + roll[2:], normals=shade
-        )
+    tilt = rng.normal(0, 0.55, (3 * leaves, 3))
+    at = centres[home] + out * extents[home] * (0.82 + 0.20 * rolls[:, :1])
+    inside = np.linalg.norm((at[:, None] - centres) / extents, axis=2) < 0.80
+    inside[np.arange(len(at)), home] = False
+    seen = np.flatnonzero(~inside.any(axis=1) & (at[:, 2] > 0.3 * leaf))[:leaves]
+    at, out, rolls, tilt = at[seen], out[seen], rolls[seen], tilt[seen]
+    normal = _unit(out + tilt)
+    side = _unit(np.cross(normal, [0.31, -0.52, 0.80]))
+    turn = 2 * np.pi * (rolls[:, 1:2] + np.array([0.0, 0.35, 0.66]))
+    size = leaf * (0.7 + 0.6 * rolls[:, 3:]) * np.array([1.0, 0.62, 0.85])
+    spokes = (
+        np.cos(turn)[..., None] * side[:, None] + np.sin(turn)[..., None] * np.cross(normal, side)[:, None]
+    )
+    rings = at[:, None] + size[..., None] * spokes
+    rings[..., 2] = np.maximum(rings[..., 2], 0.0)
+    uv = _leaf_uv(rings, normal) + rolls[:, None, 2:]
+    shade = np.repeat(_unit(out + 0.6 * tilt)[:, None], 3, axis=1)
+    builder.polygons(rings, Surface.FOLIAGE, facing=normal, uv=uv, normals=shade)
 
 
 def _unit(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
-def _leaf_uv(points: Floats, normal: Floats) -> Floats:
-    axis = int(np.argmax(np.abs(normal)))
-    flat = np.delete(points, axis, axis=1)
-    return np.asarray(flat / 3.2)
+def _leaf_uv(points: Floats, normals: Floats) -> Floats:
+    """Lay triangles (P, 3, 3) that look along ``normals`` (P, 3) on the leaves' texture."""
+    return planar_uv(points, normals, np.full(len(points), Surface.FOLIAGE, np.uint8))
 
 
 def _broadleaf(name: str, size: tuple[float, float, float], clumps: int, low: float, detail: int) -> Mesh:

@@ -73,8 +73,8 @@ def _walls(builder: MeshBuilder, half_x: float, half_y: float, top: float) -> No
         start, end = ring[i], ring[(i + 1) % 4]
         width = float(np.hypot(*(end - start)))
         bays = max(1, round(width / FLOOR)) / 4
-        # A quarter repeat is a bay; each wall starts at another one, so that not all blinds are closed alike.
-        u0, v1 = 0.25 * i, top / FLOOR / 4
+        # A quarter repeat is a bay and a storey; each wall starts at another bay, so that its blinds differ.
+        u0, v1 = 0.25 * i, max(1, round(top / FLOOR)) / 4
         corners = [(*start, 0.0), (*end, 0.0), (*end, top), (*start, top)]
         builder.polygon(corners, Surface.FACADE, uv=[(u0, 0), (u0 + bays, 0), (u0 + bays, v1), (u0, v1)])
 
@@ -202,12 +202,17 @@ def _woods(letter: str) -> tuple[Mesh, Mesh]:
             lattice = np.stack([np.stack([x, y, z], axis=1) for y, z in rows])
             fluff = rng.normal(0, 0.45, lattice.shape) + np.array([0.0, 0.8 * side, 0.45])
             fluff /= np.linalg.norm(fluff, axis=2, keepdims=True)
-            for i in range(len(rows) - 1):
-                for j in range(len(x) - 1):
-                    pick = ([i, i + 1, i + 1, i], [j, j, j + 1, j + 1])
-                    builder.polygon(
-                        lattice[pick], Surface.FOLIAGE, facing=(0, side, 0.6), normals=fluff[pick]
-                    )
+            patch = [
+                (slice(None, -1), slice(None, -1)),
+                (slice(1, None), slice(None, -1)),
+                (slice(1, None), slice(1, None)),
+            ]
+            patch += [(slice(None, -1), slice(1, None))]
+            quads, shades = (
+                np.stack([a[cut] for cut in patch], axis=2).reshape(-1, 4, 3) for a in (lattice, fluff)
+            )
+            facing = np.broadcast_to(np.array([0, side, 0.6]), (len(quads), 3))
+            builder.polygons(quads, Surface.FOLIAGE, facing=facing, normals=shades)
         meshes.append(scaled_to(builder, WOODS))
     return meshes[0], meshes[1]
 
