@@ -63,6 +63,8 @@ def twins(road, count, *, stock=IDMVehicle, indexed=QuickVehicle, seed=0, connec
     for kind, vehicle in ((Road, stock), (IndexedRoad, indexed)):
         world = kind(network=road.network, neighbour_vehicles_connected_lanes=connected)
         populate(road, world, vehicle, count, seed)
+        for number, driver in enumerate(world.vehicles):  # slow and fast ones, so that lanes are changed
+            driver.target_speed = 10.0 if number % 5 == 4 else 32.0
         worlds.append(world)
     return worlds
 
