@@ -12,7 +12,7 @@ from sim.camera import Camera, Pose
 from sim.models import Surface
 from sim.render.antialias import smooth_edges
 from sim.render.context import check, context
-from sim.render.ground import MARGIN, cut, grain_texture, road_texture
+from sim.render.ground import MARGIN, cut, grain_texture, mark_table, road_texture
 from sim.render.instances import COMMAND, INSTANCE, Library, in_bands
 from sim.render.lamps import HALO, LIGHTS, Burning, LampPlan, halos, lights
 from sim.render.programs import program, set_uniforms
@@ -25,7 +25,6 @@ from sim.world import Bodies, WorldState
 
 _ROOM = 8192  # instances and draws in a frame
 
-_LINE_WIDTH = 0.15
 _BEAM = 420.0
 _GLOSS = {  # share of the body's colour (2: by the texture's alpha), least reflection, by the alpha, retro-reflection
     Surface.PAINT: (1.0, 0.055, 0.02, 0.0),
@@ -137,14 +136,16 @@ class GlRenderer:
         ctx.enable_only(ctx.DEPTH_TEST | ctx.CULL_FACE)
         ctx.front_face = "cw"
         self._target.clear()
-        for shader in (self._body, self._terrain):
+        for shader in (self._body, self._paved, self._land):
             set_uniforms(shader, **view)
         self._texture_array.use(0)
         self._grain.use(1)
         self._road.use(2)
         self._mask_texture.use(3)
+        self._marks.use(5)
         self._body_array.render_indirect(self._commands, count=draws[0])
-        self._terrain_array.render_indirect(self._ground_commands, count=draws[1])
+        self._paved_array.render_indirect(self._ground_commands, count=draws[1])
+        self._land_array.render_indirect(self._ground_commands, count=draws[1], first=draws[1])
 
     def _sky_pass(self, ctx: Any, camera: Camera, pose: Pose) -> None:
         width, height = self._size
@@ -162,8 +163,8 @@ class GlRenderer:
             ]
         )
         self._panorama.use(4)
-        set_uniforms(self._sky, u_look=look.astype("<f4").tobytes())
-        self._sky_array.render(vertices=3)
+        set_uniforms(self._sky, u_look=look.astype("<f4").tobytes(), u_middle=np.arctan2(ahead[1], ahead[0]))
+        self._sky_array.render()
         ctx.depth_func = "<"
 
     def _light_up(self, burning: Burning, pose: Pose) -> None:
@@ -171,7 +172,7 @@ class GlRenderer:
         shining = lights(burning)
         ahead = pose.rotation[2] * [1, 1, 0]
         ahead /= np.sqrt(ahead @ ahead)
-        for shader in (self._body, self._terrain):
+        for shader in (self._body, self._paved, self._land):
             set_uniforms(
                 shader,
                 u_lamps=LIGHTS,
@@ -224,7 +225,7 @@ class GlRenderer:
         self._ground_vertices = keep(ctx.buffer(self._ground.vertices.tobytes()))
         self._ground_faces = keep(ctx.buffer(self._ground.faces.tobytes()))
         self._stretches = keep(ctx.buffer(reserve=chunks * 16, dynamic=True))
-        self._ground_commands = keep(ctx.buffer(reserve=chunks * COMMAND.itemsize, dynamic=True))
+        self._ground_commands = keep(ctx.buffer(reserve=2 * chunks * COMMAND.itemsize, dynamic=True))
 
     def _make_targets(self, ctx: Any) -> None:
         keep, size = self._keep, self._size
@@ -248,15 +249,17 @@ class GlRenderer:
         self._grain = self._mapped(ctx, grain_texture(light.seed))
         self._road = self._mapped(ctx, road_texture(self._stage.ground, light.seed))
         self._texture_array.build_mipmaps()
-        self._texture_array.filter = (ctx.LINEAR_MIPMAP_LINEAR, ctx.LINEAR)
+        self._texture_array.filter = (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
+        marks = mark_table(self._stage.ground)
+        self._marks = keep(ctx.texture(marks.shape[1::-1], 4, marks.tobytes(), dtype="f4"))
         painted = panorama(light)
-        self._panorama = keep(ctx.texture(painted.shape[1::-1], 3, painted.tobytes(), alignment=1))
+        self._panorama = keep(ctx.texture(painted.shape[1::-1], 4, painted.tobytes()))
         self._panorama.repeat_y = False
 
     def _mapped(self, ctx: Any, image: NDArray[np.uint8]) -> Any:
         texture = self._keep(ctx.texture(image.shape[1::-1], 4, image.tobytes()))
         texture.build_mipmaps()
-        texture.filter = (ctx.LINEAR_MIPMAP_LINEAR, ctx.LINEAR)
+        texture.filter = (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
         return texture
 
     def _make_programs(self, ctx: Any) -> None:
@@ -287,19 +290,24 @@ class GlRenderer:
                 self._faces,
             )
         )
-        self._terrain = keep(program(ctx, "ground", "ground", *night, shared=shared))
-        self._terrain_array = keep(
-            ctx.vertex_array(
-                self._terrain,
-                [
-                    (self._ground_vertices, "3f 2f", "in_position", "in_road"),
-                    (self._stretches, "3f 1f/i", "i_offset", "i_arc"),
-                ],
-                self._ground_faces,
+        self._paved = keep(program(ctx, "ground", "ground", "ROAD", *night, shared=shared))
+        self._land = keep(program(ctx, "ground", "ground", *night, shared=shared))
+        self._paved_array, self._land_array = (
+            keep(
+                ctx.vertex_array(
+                    shader,
+                    [
+                        (self._ground_vertices, "3f 2f", "in_position", "in_road"),
+                        (self._stretches, "3f 1f/i", "i_offset", "i_arc"),
+                    ],
+                    self._ground_faces,
+                )
             )
+            for shader in (self._paved, self._land)
         )
-        self._sky = keep(program(ctx, "screen", "sky", shared=("light",)))
-        self._sky_array = keep(ctx.vertex_array(self._sky, []))
+        self._sky = keep(program(ctx, "sky", "sky"))
+        self._sky_grid = keep(ctx.buffer(screen_grid().tobytes()))
+        self._sky_array = keep(ctx.vertex_array(self._sky, [(self._sky_grid, "2f", "in_corner")]))
         lit = {
             "u_sun": tuple(light.sun),
             "u_sun_colour": tuple(light.sun_colour / np.pi),  # what a white surface that faces it sends back
@@ -307,23 +315,18 @@ class GlRenderer:
             "u_horizon": tuple(light.horizon),
             "u_haze": light.haze,
         }
-        for shader in (self._body, self._terrain, self._sky):
-            set_uniforms(shader, **lit, u_textures=0, u_grain=1, u_road=2, u_shadow=3, u_panorama=4)
+        for shader in (self._body, self._paved, self._land, self._sky):
+            set_uniforms(
+                shader, **lit, u_textures=0, u_grain=1, u_road=2, u_shadow=3, u_panorama=4, u_marks=5
+            )
         table = np.zeros((len(Surface), 4), "<f4")
         for surface, row in _GLOSS.items():
             table[surface] = row
         set_uniforms(self._body, u_material=table.tobytes())
-        lines = line_table(stage.ground.lane_edges, stage.ground.line_styles)
-        set_uniforms(
-            self._terrain,
-            u_line=np.vstack([lines, np.zeros((24 - len(lines), 3))]).astype("<f4").tobytes(),
-            u_lines=len(lines),
-            u_paved=stage.ground.paved,
-            u_margin=MARGIN,
-            u_wet=light.wet,
-        )
+        for shader in (self._paved, self._land):
+            set_uniforms(shader, u_paved=stage.ground.paved, u_margin=MARGIN, u_wet=light.wet)
         set_uniforms(self._sky, u_highest=HIGHEST)
-        for shader in (self._body, self._terrain):
+        for shader in (self._body, self._paved, self._land):
             set_uniforms(shader, u_beam=_BEAM, u_street=float(self._streets))
         self._halo = keep(program(ctx, "halo", "halo"))
         self._corners = keep(ctx.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], "<f4").tobytes()))
@@ -350,13 +353,9 @@ class GlRenderer:
         )
 
 
-def line_table(edges: NDArray[np.float64], styles: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Turn a ground's lines into what its shader reads: offset, half width (negative where dashed), yellow."""
-    rows = []
-    for edge, style in zip(edges, styles, strict=True):
-        half = 0.5 * _LINE_WIDTH
-        if style == 4:
-            rows += [(edge - 0.15, half, 1.0), (edge + 0.15, half, 1.0)]
-        elif style:
-            rows.append((edge, -half if style == 2 else half, float(style == 3)))
-    return np.array(rows).reshape(-1, 3)
+def screen_grid(columns: int = 16, rows: int = 12) -> NDArray[np.float32]:
+    """Return (6 * columns * rows, 2) corners of the triangles of a grid over clip space."""
+    x, y = np.linspace(-1, 1, columns + 1), np.linspace(-1, 1, rows + 1)
+    corners = np.stack(np.meshgrid(x, y), axis=-1)
+    a, b, c, d = corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]
+    return np.stack([a, b, c, c, b, d], axis=2).reshape(-1, 2).astype(np.float32)

@@ -22,6 +22,7 @@ STRETCH = np.dtype([("offset", "<f4", 3), ("arc", "<f4")])
 """One stretch, as the shader reads it: its origin relative to the camera, and what to add to its arc lengths."""
 
 _STRETCH_LENGTH = 128.0
+_HALF_LINE = 0.075
 _ACROSS, _ALONG = 512, 2048
 
 
@@ -34,6 +35,7 @@ class Stretches:
         faces: (F, 3) int32, counted from each stretch's ``base_vertex``.
         first: (C,) first index.
         count: (C,) indices.
+        paved: (C,) how many of them, from the first, make the paved band.
         base_vertex: (C,).
         origins: (C, 3) float64, world metres.
         arcs: (C,) float64 arc length of the origins, modulo `PERIOD`.
@@ -45,6 +47,7 @@ class Stretches:
     faces: NDArray[np.int32]
     first: NDArray[np.uint32]
     count: NDArray[np.uint32]
+    paved: NDArray[np.uint32]
     base_vertex: NDArray[np.int32]
     origins: NDArray[np.float64]
     arcs: NDArray[np.float64]
@@ -73,14 +76,14 @@ class Stretches:
         return out
 
     def commands(self, rows: NDArray[np.intp]) -> NDArray[np.void]:
-        """Return (C,) `COMMAND` records."""
-        out = np.zeros(len(rows), COMMAND)
-        out["count"] = self.count[rows]
+        """Return (2 C,) `COMMAND` records: first all paved bands, then all the land."""
+        out = np.zeros((2, len(rows)), COMMAND)
+        out["count"] = self.paved[rows], self.count[rows] - self.paved[rows]
         out["instances"] = 1
-        out["first"] = self.first[rows]
+        out["first"] = self.first[rows], self.first[rows] + self.paved[rows]
         out["base_vertex"] = self.base_vertex[rows]
         out["base_instance"] = np.arange(len(rows))
-        return out
+        return out.ravel()
 
 
 def cut(ground: Ground) -> Stretches:
@@ -89,8 +92,12 @@ def cut(ground: Ground) -> Stretches:
     bins = np.floor(arc / _STRETCH_LENGTH).astype(np.int64)
     order = np.argsort(bins, kind="stable")
     edges = np.flatnonzero(np.diff(bins[order], prepend=bins[order[0]] - 1))
-    vertices, faces, origins, arcs, lower, upper, counts = [], [], [], [], [], [], []
+    offset = ground.coordinates[ground.faces, 1]
+    paved = ((offset > ground.paved[0] - 0.01) & (offset < ground.paved[1] + 0.01)).all(axis=1)
+    vertices, faces, origins, arcs, lower, upper, counts, roads = [], [], [], [], [], [], [], []
     for members in np.split(order, edges[1:]):
+        members = members[np.argsort(~paved[members], kind="stable")]
+        roads.append(3 * np.count_nonzero(paved[members]))
         used, local = np.unique(ground.faces[members], return_inverse=True)
         points = ground.vertices[used].astype(np.float64)
         origin = points.mean(axis=0)
@@ -112,6 +119,7 @@ def cut(ground: Ground) -> Stretches:
         faces=np.concatenate(faces).astype(np.int32),
         first=np.concatenate([[0], np.cumsum(face_counts)[:-1]]).astype(np.uint32),
         count=face_counts.astype(np.uint32),
+        paved=np.array(roads, np.uint32),
         base_vertex=np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int32),
         origins=np.array(origins),
         arcs=np.array(arcs),
@@ -214,3 +222,27 @@ def road_texture(ground: Ground, seed: int) -> NDArray[np.uint8]:
     wear = np.clip(0.5 + 0.2 * fractal(rng, shape, 0.7, lowest=4), 0, 1)
     channels = np.stack([albedo, tar, wear, dust], axis=-1)
     return (np.clip(channels, 0, 1) * 255 + 0.5).astype(np.uint8)
+
+
+def mark_table(ground: Ground) -> NDArray[np.float32]:
+    """Tell for each place across the road which painted line is nearest.
+
+    Args:
+        ground: Its lines.
+
+    Returns:
+        (1, 2048, 4) float32 over the paved band with `MARGIN`: offset of the line's middle, its half width (0 where
+        there is none at all), 1 if dashed, 1 if yellow.
+    """
+    lines = []
+    for edge, style in zip(ground.lane_edges.tolist(), ground.line_styles.tolist(), strict=True):
+        if style == 4:
+            lines += [(edge - 0.15, _HALF_LINE, 0.0, 1.0), (edge + 0.15, _HALF_LINE, 0.0, 1.0)]
+        elif style:
+            lines.append((edge, _HALF_LINE, float(style == 2), float(style == 3)))
+    if not lines:
+        return np.zeros((1, 2048, 4), np.float32)
+    table = np.array(lines, np.float32)
+    low, high = ground.paved[0] - MARGIN, ground.paved[1] + MARGIN
+    d = low + (np.arange(2048) + 0.5) / 2048 * (high - low)
+    return np.asarray(table[np.abs(d[:, None] - table[:, 0]).argmin(axis=1)][None])

@@ -23,17 +23,17 @@ def panorama(light: Light) -> NDArray[np.uint8]:
         light: Sun, colours, cloud cover and the clouds' seed.
 
     Returns:
-        (512, 4096, 3) uint8, the square root of the radiance; rows from the horizon up to `HIGHEST`, columns by
+        (512, 4096, 4) uint8, as the film shows it; rows from the horizon up to `HIGHEST`, columns by
         azimuth counter-clockwise from east.
     """
     import cv2
 
-    elevation = ((np.arange(_HEIGHT) + 0.5) / _HEIGHT * HIGHEST)[:, None]
-    azimuth = ((np.arange(_WIDTH) + 0.5) / _WIDTH * 2 * np.pi)[None, :]
+    elevation = ((np.arange(_HEIGHT, dtype=np.float32) + 0.5) / _HEIGHT * np.float32(HIGHEST))[:, None]
+    azimuth = ((np.arange(_WIDTH, dtype=np.float32) + 0.5) / _WIDTH * np.float32(2 * np.pi))[None, :]
     up = np.sin(elevation)
     east, north = np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth)
     blend = (1 - np.exp(-up / 0.22))[..., None]
-    sky = light.horizon * (1 - blend) + light.zenith * blend
+    sky = light.horizon.astype(np.float32) * (1 - blend) + light.zenith.astype(np.float32) * blend
     sky = np.broadcast_to(sky, (_HEIGHT, _WIDTH, 3)).copy()
     toward = east * light.sun[0] + north * light.sun[1] + up * light.sun[2]
     if not light.night:
@@ -61,4 +61,8 @@ def panorama(light: Light) -> NDArray[np.uint8]:
     cloud = white * (1.12 - 0.55 * thick - 0.25 * light.cloud)[..., None]
     fade = np.clip(up / 0.08, 0, 1)[..., None] * 0.92
     sky += (cloud - sky) * cover[..., None] * fade
-    return (np.sqrt(np.clip(sky, 0, 1)) * 255 + 0.5).astype(np.uint8)
+    sky = np.clip(sky, 0, 4)
+    shown = np.sqrt(sky * (1 + 0.12 * sky) / (1 + 0.42 * sky * sky))  # film() of the shaders
+    out = np.full((_HEIGHT, _WIDTH, 4), 255, np.uint8)
+    out[..., :3] = np.clip(shown, 0, 1) * 255 + 0.5
+    return out

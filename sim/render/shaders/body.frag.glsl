@@ -50,12 +50,18 @@ void main() {
     vec3 ambient = mix(0.18 * (u_sun_colour * max(u_sun.z, 0.0) + u_horizon), 0.35 * u_zenith + 0.65 * u_horizon, up);
     vec3 light = u_sun_colour * max(dot(normal, u_sun), 0.0) + shade * ambient;
     vec3 mirror = reflect(view, normal);
-    vec3 world = mix(0.12 * (u_sun_colour + u_horizon), sky(mirror.z), smoothstep(-0.05, 0.04, mirror.z));
+    vec3 world = mix(0.12 * (u_sun_colour + u_horizon), sky(mirror.z), clamp(mirror.z * 11.0 + 0.55, 0.0, 1.0));
     float grazing = 1.0 - facing;
     grazing *= grazing;
     float gloss = material.y + material.z * texel.a;
     float reflection = clamp(gloss * (1.0 + 8.0 * grazing * grazing * grazing), 0.0, 0.9);
-    float glint = pow(max(dot(mirror, u_sun), 0.0), 90.0) * min(8.0 * gloss, 1.0);
+    float glint = max(dot(mirror, u_sun), 0.0);
+    glint *= glint;
+    glint *= glint;
+    glint *= glint;
+    glint *= glint;
+    glint *= glint;
+    glint *= glint * min(8.0 * gloss, 1.0);
 #ifdef NIGHT
     float beam = own_beam(v_at, normal);
     light += lamplight(v_at, normal) + beam * vec3(1.0, 0.93, 0.8) * (1.0 + material.w);
