@@ -118,7 +118,9 @@ class InCarRoad:
     def lane_offsets(self, same_way: bool) -> Floats:
         """Return the offsets d of the lanes' middles, from the left as their drivers see it."""
         count = self.params.lanes if same_way else self.params.oncoming_lanes
-        away = self.params.median / 2 + (np.arange(count) + 0.5) * self.params.lane_width
+        away: Floats = (
+            self.params.median / 2 + (np.arange(count, dtype=np.float64) + 0.5) * self.params.lane_width
+        )
         return -away if same_way else away
 
     def to_world(self, s: ArrayLike, d: ArrayLike) -> tuple[Floats, Floats]:

@@ -371,3 +371,20 @@ def test_an_empty_road_has_no_traffic():
     run.step()
     assert len(run.vehicles()) == 0
     assert run.ego().speed == pytest.approx(20.0, abs=0.5)
+
+
+@pytest.mark.slow
+def test_a_long_drive_costs_no_more_than_a_short_one():
+    """Two minutes on 4 km of curves: the window empties behind as it fills ahead."""
+    run = traffic("curve", 1, seconds=120.0)
+    counts, last = [], 0
+    for tick in range(120 * RATE):
+        run.step()
+        if tick % RATE == 0:
+            bodies = run.vehicles()
+            counts.append(len(bodies))
+            last = int(bodies.ids.max())
+            assert not run.collided
+    assert 0.6 < np.mean(counts[-30:]) / np.mean(counts[:30]) < 1.6
+    assert max(counts) < 80
+    assert last - FIRST_VEHICLE_ID > 2 * max(counts)  # others had come, and their numbers are not used again
