@@ -36,7 +36,7 @@ def annotate(
         tracks: What the tracker returned for it.
         traces: What else it showed, or None.
         truth_boxes: (N, 4) boxes of the scored objects, px, or None.
-        caption: Written into the strip.
+        caption: Written into the upper left corner.
 
     Returns:
         (H + `STRIP`, W, 3) uint8 RGB.
@@ -59,7 +59,9 @@ def annotate(
             _dashed(picture, box, colour)
         else:
             _rectangle(picture, box, colour, 1)
-    cv2.putText(canvas, caption, (6, height + STRIP - 8), _FONT, 0.4, (190, 195, 205), 1, cv2.LINE_AA)
+    # Dark beneath light: to be read on any sky.
+    cv2.putText(canvas, caption, (8, 18), _FONT, 0.45, (20, 20, 24), 3, cv2.LINE_AA)
+    cv2.putText(canvas, caption, (8, 18), _FONT, 0.45, (240, 240, 245), 1, cv2.LINE_AA)
     return canvas
 
 
@@ -87,10 +89,10 @@ def _dashed(canvas: NDArray[np.uint8], box: NDArray[np.float64], colour: Rgb) ->
 def _tag(canvas: NDArray[np.uint8], box: NDArray[np.float64], text: str, colour: Rgb) -> None:
     """Write black on colour, above the box or, where there is no room, inside it."""
     x0, y0, _, _ = _corners(box)
-    (width, height), _ = cv2.getTextSize(text, _FONT, 0.45, 1)
+    (width, height), _ = cv2.getTextSize(text, _FONT, 0.4, 1)
     bottom = y0 if y0 > height + 5 else y0 + height + 6
     cv2.rectangle(canvas, (x0 - 1, bottom - height - 5), (x0 + width + 4, bottom), colour, cv2.FILLED)
-    cv2.putText(canvas, text, (x0 + 2, bottom - 3), _FONT, 0.45, (10, 10, 14), 1, cv2.LINE_AA)
+    cv2.putText(canvas, text, (x0 + 2, bottom - 3), _FONT, 0.4, (10, 10, 14), 1, cv2.LINE_AA)
 
 
 def _draw_traces(canvas: NDArray[np.uint8], horizon: int, traces: Traces) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scenarios.log import EpisodeLog
 from scenarios.report import plots
 from scenarios.report.history import TraceSamples
-from scenarios.report.palette import CLASSES, SERIES
+from scenarios.report.palette import CLASSES, LABELS, SERIES
 from scenarios.report.plots import Plot
 from scenarios.report.series import Series, measure
 from scenarios.score.params import Boxes
@@ -171,12 +171,14 @@ def _times(
                 steps=True,
             ),
         )
+    if series is not None and np.isfinite(series.overlap).any() and len(series.overlap) == len(times):
         add(
             "Overlap of matches",
             "Mean IoU of matched boxes.",
             plots.lines({"IoU": (times, series.overlap)}, seconds=seconds, label="mean IoU", limits=(0, 1)),
         )
     if len(samples.ids):
+        add(*_counts(samples, recording, seconds))
         add(*_belief(samples, series, recording, seconds))
     if log is not None and np.isfinite(log.ego_speed).any() and len(log.ego_speed) == len(times):
         add(
@@ -206,6 +208,26 @@ def _times(
                 ),
             )
     return drawn
+
+
+def _counts(
+    samples: TraceSamples, recording: Recording, seconds: float
+) -> tuple[str, str, tuple[Any, plots.TimeAxis]]:
+    """Draw how many traces of each label there are in a frame."""
+    kept = np.arange(0, max(recording.frames, 1), recording.history.stride)
+    times: Floats = np.asarray((kept + 0.5) / recording.rate, float)
+    rows = samples.ticks // recording.history.stride
+    counts: dict[str, tuple[Floats, Floats]] = {
+        label.name.lower(): (
+            times,
+            np.bincount(rows[samples.labels == label], minlength=len(kept)).astype(float),
+        )
+        for label in LABELS
+    }
+    drawing = plots.lines(
+        counts, seconds=seconds, label="traces", limits=(0, None), colours=list(LABELS.values()), steps=True
+    )
+    return "Traces", "Traces in a frame, by what the tracker takes them for.", drawing
 
 
 def _belief(

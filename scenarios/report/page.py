@@ -22,8 +22,10 @@ from scenarios.report.tables import (
     TILE_COUNT,
     TILES,
     Row,
+    attribute_notes,
     is_group,
     number,
+    parameter_rows,
     plain_rows,
     score_row,
     words,
@@ -151,7 +153,9 @@ def write_page(
             times=drawn.times,
             stills=recording.stills,
             figures=recording.figures,
-            thresholds=plain_rows(asdict(ScoringParams())) if values else [],
+            thresholds=parameter_rows(asdict(ScoringParams()), attribute_notes(ScoringParams))
+            if values
+            else [],
             parameters=_parameters(scenario),
             digests=list((log.hashes if log else {}).items()),
             version=metadata.version("testtrack"),
@@ -277,10 +281,10 @@ def _parameters(scenario: Mapping[str, Any]) -> list[Table]:
     def add(title: str, values: Mapping[str, Any]) -> None:
         plain = {key: value for key, value in values.items() if not isinstance(value, Mapping)}
         if plain:
-            tables.append(Table(title, plain_rows(plain)))
+            tables.append(Table(title, parameter_rows(plain)))
         for key, value in values.items():
             if isinstance(value, Mapping):
                 add(words(key).capitalize(), value)
 
-    add("Scenario", scenario)
+    add("Scenario", {key: value for key, value in scenario.items() if key != "description"})
     return tables

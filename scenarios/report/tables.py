@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -83,7 +84,7 @@ def number(value: object) -> str:
     if isinstance(value, float):
         if not isfinite(value):
             return DASH
-        return f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}"
+        return (f"{value:.3f}" if abs(value) < 10 else f"{value:.1f}").replace("-", "−")
     if isinstance(value, Mapping):
         return number(value["mean"])
     if isinstance(value, Sequence) and not isinstance(value, str):
@@ -96,6 +97,8 @@ def words(name: str) -> str:
     if name in ("hota", "mota", "motp"):
         return name.upper()
     special = {"deta": "DetA", "assa": "AssA", "idf1": "IDF1", "id_switches": "ID switches"}
+    if name.endswith("_s"):
+        return f"{words(name[:-2])}, s"
     return special.get(name) or name.replace("_", " ").replace("-", " ")
 
 
@@ -145,3 +148,25 @@ def plain_rows(values: Mapping[str, Any]) -> list[Row]:
         Row(name=" · ".join(words(key) for key in keys), text=number(value), missing=value is None)
         for keys, value in flat(values)
     ]
+
+
+def parameter_rows(values: Mapping[str, Any], notes: Mapping[str, str] | None = None) -> list[Row]:
+    """Return parameters as rows: what was set is printed in full.
+
+    Args:
+        values: By name.
+        notes: What they mean, by name.
+    """
+    return [
+        Row(
+            name=words(name),
+            text=f"{value:g}" if isinstance(value, float) else number(value),
+            note=(notes or {}).get(name, ""),
+        )
+        for name, value in values.items()
+    ]
+
+
+def attribute_notes(documented: type) -> dict[str, str]:
+    """Return what a class says of its attributes, by their names: the lines of its docstring."""
+    return dict(re.findall(r"^ +(\w+): (.+)$", documented.__doc__ or "", re.MULTILINE))
