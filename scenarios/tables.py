@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
@@ -32,22 +33,28 @@ def print_scores(document: Mapping[str, Any]) -> None:
     seeds = first["seeds"]
     which = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
     title = f"{first['scenario']}, {which}, {first['frames']} frames"
-    table = Table("", *(run["tracker"] for run in runs), title=title, title_justify="left")
+    table = _table(title, "", *(run["tracker"] for run in runs))
     for section in ("scores", "difficulty", "timing_ms"):
-        _add_section(table, section, [_flat(run[section]) for run in runs])
-    table.add_row("fps", *(_text(run["fps"]) for run in runs))
-    table.add_row("peak_rss_mb", *(_text(run["peak_rss_mb"]) for run in runs))
+        table.add_section()
+        _add_rows(table, [run[section] for run in runs], prefix="" if section == "scores" else section)
+    table.add_section()
+    for key in ("fps", "peak_rss_mb"):
+        table.add_row(key, *(_text(run[key]) for run in runs))
     _console().print(table)
-    if document.get("paired"):
-        _print_paired(document["paired"])
+    for pair in document.get("paired", ()):
+        name = f"{pair['tracker']} less {pair['against']}, on the same frames"
+        table = _table(name, "", "difference", "n")
+        for key, difference in _flat(pair["difference"]).items():
+            table.add_row(key, _text(difference), str(difference["n"]))
+        if table.row_count:
+            _console().print(table)
 
 
 def print_recording(document: Mapping[str, Any]) -> None:
     """Print what `scenarios.recording.follow` returns."""
-    table = Table("", document["method"], title=document["video"], title_justify="left")
-    for key, value in _flat(
-        {k: v for k, v in document.items() if k not in ("video", "method", "hashes")}
-    ).items():
+    table = _table(document["video"], "", document["method"])
+    shown = {key: value for key, value in document.items() if key not in ("video", "method", "hashes")}
+    for key, value in _flat(shown).items():
         table.add_row(key, _text(value))
     _console().print(table)
 
@@ -62,27 +69,29 @@ def print_checks(checks: Iterable[Check]) -> None:
             console.print("    ", check.remedy, highlight=False, markup=False, soft_wrap=True)
 
 
-def _print_paired(paired: Sequence[Mapping[str, Any]]) -> None:
-    table = Table(
-        "difference",
-        "score",
-        "mean and 95 %",
-        "n",
-        title="paired: same frames, same seeds",
-        title_justify="left",
-    )
-    for pair in paired:
-        what = " - ".join(str(pair[side]) for side in ("tracker", "against"))
-        for score, difference in _flat(pair["difference"]).items():
-            table.add_row(what, score, _text(difference), str(difference["n"]))
-    _console().print(table)
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for k, column in enumerate(columns):
+        table.add_column(column, no_wrap=k == 0, overflow="fold", justify="right" if k else "left")
+    return table
 
 
-def _add_section(table: Table, name: str, columns: Sequence[Mapping[str, Any]]) -> None:
-    keys = list(dict.fromkeys(key for column in columns for key in column))
-    for key in keys:
-        table.add_row(key if name == "scores" else f"{name}.{key}", *(_text(c.get(key)) for c in columns))
-    table.add_section()
+def _add_rows(table: Table, columns: Sequence[Mapping[str, Any]], prefix: str) -> None:
+    """Add a row for each key that any column has; nested ones go below a row of their own, indented."""
+    if prefix:
+        table.add_row(f"[bold]{prefix}[/]")
+    for key in dict.fromkeys(key for column in columns for key in column):
+        values = [column.get(key) for column in columns]
+        indent = "  " if prefix else ""
+        nested = [value if isinstance(value, Mapping) and "ci95" not in value else {} for value in values]
+        if any(nested):
+            table.add_section()
+            table.add_row(f"[bold]{indent}{key}[/]")
+            flat = [_flat(value) for value in nested]
+            for inner in dict.fromkeys(inner for column in flat for inner in column):
+                table.add_row(f"{indent}  {inner}", *(_text(column.get(inner)) for column in flat))
+        else:
+            table.add_row(f"{indent}{key}", *map(_text, values))
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

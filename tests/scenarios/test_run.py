@@ -1,0 +1,132 @@
+"""The whole command on the real simulation, on half a second of a drive."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from scenarios import runs, spec
+from scenarios.log import load
+from scenarios.runs import Run
+from sim.render.context import RenderUnavailableError, context
+
+SILENT = "tests.scenarios.fakes:SilentTracker"
+MIDDLE = "tests.scenarios.test_cli:MiddleTracker"
+SHORT = ("--set", "seconds=0.5")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _needs_gl():
+    try:
+        context()
+    except RenderUnavailableError as error:
+        pytest.skip(str(error))
+
+
+def command(*arguments, hash_seed="0", start=subprocess.run, **options):
+    return start(
+        [sys.executable, "-m", "scenarios.cli", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONHASHSEED": hash_seed},
+        **options,
+    )
+
+
+def document(*arguments, **options):
+    ended = command("run", "in-car-day", *SHORT, "--json", *arguments, **options)
+    assert ended.returncode == 0, ended.stderr
+    return json.loads(ended.stdout)
+
+
+@pytest.fixture(scope="module")
+def first():
+    return document("--tracker", "in-car", hash_seed="1")
+
+
+def test_the_document_has_what_the_contract_names(first):
+    assert {"scenario", "spec_id", "seeds", "tracker", "frames", "scores", "difficulty"} <= set(first)
+    assert {"hashes", "timing_ms", "fps", "peak_rss_mb"} <= set(first)
+    assert (first["scenario"], first["seeds"], first["frames"]) == ("in-car-day", [0], 15)
+    assert first["tracker"] == "in-car"
+    assert set(first["hashes"]) == {"truth", "frames", "tracks"}
+    assert list(first["timing_ms"]) == ["world", "render", "sensor", "truth", "track"]
+    assert {"hota", "mota", "idf1", "identification"} <= set(first["scores"])
+
+
+def test_the_same_in_another_process_under_another_hash_seed(first):
+    again = document("--tracker", "in-car", hash_seed="2")
+    for key in ("spec_id", "scores", "difficulty", "hashes"):
+        assert again[key] == first[key]
+
+
+def test_seeds_and_settings_change_what_they_should():
+    def hashes(seed, *settings):
+        scenario = spec.load("in-car-day", ["seconds=0.1", *settings])
+        run = Run(scenario=scenario, seeds=range(seed, seed + 1), trackers=(SILENT,))
+        return runs.execute(run)["hashes"]
+
+    usual = hashes(0)
+    assert hashes(0) == usual
+    assert hashes(1)["truth"] != usual["truth"]
+    assert hashes(1)["frames"] != usual["frames"]
+    noisier = hashes(0, "sensor.noise=9")
+    assert noisier["truth"] == usual["truth"]
+    assert noisier["frames"] != usual["frames"]
+
+
+def test_results_do_not_depend_on_the_jobs():
+    scenario = spec.load("in-car-day", ["seconds=0.1"])
+    options = {"scenario": scenario, "seeds": range(2), "trackers": (SILENT, MIDDLE)}
+    one = runs.execute(Run(**options, jobs=1))
+    two = runs.execute(Run(**options, jobs=2))
+    assert one["paired"] == two["paired"]
+    for a, b in zip(one["runs"], two["runs"], strict=True):
+        assert a["tracker"] == b["tracker"]
+        assert a["seeds"] == b["seeds"] == [0, 1]
+        assert a["frames"] == b["frames"] == 6
+        for key in ("scores", "difficulty", "hashes"):
+            assert a[key] == b[key]
+
+
+def test_an_episode_is_kept_whole(tmp_path):
+    run = Run(scenario=spec.load("in-car-day", ["seconds=0.1"]), seeds=range(3, 5), trackers=(SILENT, MIDDLE))
+    documents = runs.run_seed(run, 4, tmp_path)
+    folder = tmp_path / "seed-4" / "tests.scenarios.test_cli-MiddleTracker"
+    assert {entry.name for entry in folder.iterdir()} == {
+        "scores.json",
+        "tracks.txt",
+        "log.npz",
+        "report.html",
+    }
+    assert json.loads((folder / "scores.json").read_text()) == documents[MIDDLE]
+    log = load(folder / "log.npz")
+    assert (log.seed, log.tracker, len(log.tracks)) == (4, MIDDLE, 3)
+    assert log.hashes == documents[MIDDLE]["hashes"]
+
+
+def test_an_interrupt_ends_with_130_and_leaves_nothing(tmp_path):
+    process = command(
+        "run",
+        "in-car-day",
+        "--tracker",
+        SILENT,
+        "--out",
+        str(tmp_path / "deep" / "out"),
+        start=subprocess.Popen,
+    )
+    deadline = time.monotonic() + 60
+    while not any(tmp_path.iterdir()) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert out == ""
+    assert "Traceback" not in err
+    assert list(tmp_path.iterdir()) == []
