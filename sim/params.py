@@ -102,7 +102,7 @@ class LightParams(Params):
 
     time: Literal["day", "night"] = "day"
     cloud: Fraction = 0.3
-    haze: NonNegative = 0.0012
+    haze: NonNegative = 0.0006
     """Extinction per metre."""
     rain: Fraction = 0.0
     street_lamps: bool = False
