@@ -116,7 +116,7 @@ def motion_evidence(
     ground: float,
     focal: float,
     yaw_rate: float,
-    horizon_error: float = 1.5,
+    horizon_error: float = 2.5,
 ) -> Floats:
     """Return `log_ratios` of points at (N, 2) from the focus of expansion that moved by (N, 2) in (N,) seconds."""
     middle = relative - 0.5 * moved

@@ -32,8 +32,15 @@ class Extent:
 
 
 @njit(cache=True)
-def _fit(grey, x0, y0, x1, y1, loose, roof):  # type: ignore[no-untyped-def]
-    """Search sides, foot and roof around a predicted box; ``loose`` is the play as a share of the width."""
+def _beyond(share, free):  # type: ignore[no-untyped-def]
+    """Cost of an edge that lies beyond the body's points by more than a free share of the width."""
+    return min(max(share - free, 0.0) * 12.0, 5.0)
+
+
+@njit(cache=True)
+def _fit(grey, x0, y0, x1, y1, loose, body):  # type: ignore[no-untyped-def]
+    """Search sides, foot and roof around a predicted box; ``loose`` is the play as a share of the width, ``body`` the
+    box of the points that move with it."""
     height, width = grey.shape
     wide, tall = x1 - x0, y1 - y0
     step = max(1, int(wide / 40))
@@ -62,6 +69,10 @@ def _fit(grey, x0, y0, x1, y1, loose, roof):  # type: ignore[no-untyped-def]
                 + min(column[right - left_from] / mean, 4.0)
                 - 0.5 * size * size
                 - 0.5 * shift * shift
+                - _beyond((body[0] - left) / wide, 0.25)
+                - _beyond((right - body[2]) / wide, 0.25)
+                - 0.5 * _beyond((left - body[0]) / wide, 0.03)
+                - 0.5 * _beyond((body[2] - right) / wide, 0.03)
             )
             if value > best:
                 best, best_l, best_r = value, left, right
@@ -98,6 +109,7 @@ def _fit(grey, x0, y0, x1, y1, loose, roof):  # type: ignore[no-untyped-def]
         # The ground is brighter than the shadow on it; at the contact any edge is better than none.
         edge = rows[i - top]
         value = min(max(edge, -0.4 * edge) / level, 4.0) - 0.5 * shift * shift
+        value -= _beyond((body[3] - i) / wide, 0.03) + _beyond((i - body[3]) / wide, 0.4)
         if value > best:
             best, foot = value, i
     if foot >= 0:
@@ -111,9 +123,7 @@ def _fit(grey, x0, y0, x1, y1, loose, roof):  # type: ignore[no-untyped-def]
         cost = min(0.5 * off * off, TALL) if off > 0 else 0.5 * off * off
         moved = (i + 0.5 - y0) / (0.7 * play)
         cost += 0.25 * min(moved * moved, 9.0)
-        # Points that move with the body and stick out above a roof speak against it.
-        if i > roof + 1:
-            cost += 0.15 * min((i - roof) / (0.04 * wide + 1.0), 20.0)
+        cost += _beyond((i - body[1]) / wide, 0.03) + _beyond((body[1] - i) / wide, 0.25)
         value = min(abs(rows[i - top]) / level, 4.0) - cost
         if value > best:
             best, crown = value, i
@@ -122,17 +132,17 @@ def _fit(grey, x0, y0, x1, y1, loose, roof):  # type: ignore[no-untyped-def]
     return result
 
 
-def fit_extent(grey: NDArray[np.uint8], box: Floats, *, loose: float, roof: float) -> Extent:
+def fit_extent(grey: NDArray[np.uint8], box: Floats, *, loose: float, body: Floats) -> Extent:
     """Fit a box to the edges around it.
 
     Args:
         grey: (h, w).
         box: (4,) where the vehicle is expected, px.
         loose: How far an edge may lie from there, as a share of the width.
-        roof: Row of the highest point that is known to move with the body, px.
+        body: (4,) box of the points that are known to move with it.
 
     Returns:
         The best box, with its clearness.
     """
-    found = _fit(grey, box[0], box[1], box[2], box[3], loose, roof)
+    found = _fit(grey, box[0], box[1], box[2], box[3], loose, body)
     return Extent(box=found[:4], sides=float(found[4]), foot=float(found[5]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tracker.in_car.features import corner_response, find_corners
@@ -12,6 +13,19 @@ Floats = NDArray[np.float64]
 
 WINDOW = (11, 11)
 LEVELS = 2
+
+
+@njit(cache=True)
+def _apart(position):  # type: ignore[no-untyped-def]
+    """Tell which points have no older one (they come in order of age) within three pixels: (N,) bool."""
+    count = position.shape[0]
+    kept = np.ones(count, np.bool_)
+    for i in range(count):
+        for j in range(i):
+            if kept[j] and abs(position[i, 0] - position[j, 0]) < 3.0 and abs(position[i, 1] - position[j, 1]) < 3.0:
+                kept[i] = False
+                break
+    return kept
 
 
 class PointStore:
@@ -78,6 +92,7 @@ class PointStore:
             self.flow = place - self.position
             self.position = place
             self._keep(good)
+            self._keep(_apart(self.position))
             self.age += 1
         self._last = grey
 
@@ -98,6 +113,11 @@ class PointStore:
         turned = self._turned[:, -1] - self._turned[rows, then]
         return moved - turned, span.astype(float)
 
+    def frozen(self, *, play: float = 0.4) -> NDArray[np.bool_]:
+        """Tell which points (N,) have not moved in the picture at all over their remembered past."""
+        moved = np.abs(self._past - self._past[:, -1:]).max(axis=(1, 2))
+        return np.asarray((moved < play) & (self.age >= self._memory - 1))
+
     def refill(self, grey: NDArray[np.uint8], horizon: float) -> None:
         """Add corners where there are none: sparsely above the horizon, densely where far vehicles lie, then the road."""
         height, width = grey.shape
@@ -113,8 +133,8 @@ class PointStore:
         taken[rows[inside], columns[inside]] = 1
         for first, last, cell, least, quota in (
             (top, near, 24, 4e-4, 70),
-            (near, road, 7, 2e-4, 220),
-            (road, bottom, 18, 1e-4, 120),
+            (near, road, 7, 4e-4, 200),
+            (road, bottom, 18, 2e-4, 120),
         ):
             held = int(((self.position[:, 1] >= first) & (self.position[:, 1] < last)).sum())
             if held >= quota:

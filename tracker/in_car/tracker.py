@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 
 # Greatest distance at which a vehicle is begun, metres.
 REACH = 75.0
+# Rows below the horizon, as a share of the width, from which on a point that stands still in the picture is no vehicle's.
+NEAR_ROWS = 0.11
 # Frames that a point must have been followed before its motion says anything.
 RIPE = 4
 
@@ -70,7 +72,7 @@ class InCarTracker:
         seconds = frames / self._info.rate
         relative = points.position - ego.focus
         direction = relative / np.maximum(np.hypot(relative[:, 0], relative[:, 1]), 1.0)[:, None]
-        trust = np.clip((stiffness(grey, points.position, direction) - 0.03) / 0.07, 0.0, 1.0)
+        trust = np.clip((stiffness(grey, points.position, direction) - 0.05) / 0.15, 0.0, 1.0)
         ripe = points.age >= RIPE
         still = ripe & (points.evidence < 2.0) & (points.owner == 0)
         speed = frame.odometry.speed if frame.odometry else None
@@ -79,13 +81,16 @@ class InCarTracker:
         ratios = trust * motion_evidence(
             relative, moved, seconds, ground=ego.ground, focal=focal, yaw_rate=ego.yaw_rate
         )
+        # So near, no vehicle keeps its place to a fraction of a pixel: the bonnet does, and dirt, and writing in the picture.
+        painted = points.frozen() & (relative[:, 1] > NEAR_ROWS * grey.shape[1])
+        ratios[painted] = np.minimum(ratios[painted], -1.0)
         gain = np.where(ripe, np.clip(ratios, -4.0, 4.0), 0.0) / (self._info.rate * CORRELATION)
         points.evidence = np.clip(points.evidence + gain, -6.0, 6.0)
         horizon = float(ego.focus[1])
         self._front.horizon, self._front.centre_x = horizon * scale, float(ego.focus[0]) * scale
         self._front.look(picture)
         self._vehicles.step(
-            grey, points, ratios, trust, self._front.features.segments, horizon, focal * HEIGHT / REACH
+            grey, points, moved * (CORRELATION / np.maximum(seconds, 1e-3))[:, None], ratios, trust, self._front.features.segments, ego, focal * HEIGHT / REACH
         )
         traces = self._front.trace(float(ego.shift[1]))
         tracks = self._tracks(scale)

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.in_car.evidence import CLOSING, CLOSING_SHARE
 from tracker.in_car.extent import fit_extent
 from tracker.in_car.points import PointStore
-from tracker.in_car.proposals import SLIMMEST, WIDEST, propose, windows_from_points, windows_from_segments
+from tracker.in_car.proposals import BODY_PLAY, BODY_SHARE, SLIMMEST, USUAL, WIDEST, misfit, propose, windows_from_points, windows_from_segments
+from tracker.in_car.yaw import FLOW_NOISE, HEIGHT, EgoMotion
 from tracker.types import Status
 
 Floats = NDArray[np.float64]
@@ -36,6 +38,9 @@ class Vehicle:
     members: int = 0
     confirmed: bool = False
     clear: float = 0.0
+    log_width: float = float(np.log(USUAL))
+    rate_of_scale: float = 0.0
+    rate_error: float = 10.0
 
     @property
     def status(self) -> Status:
@@ -58,10 +63,11 @@ class VehicleStore:
         self,
         grey: NDArray[np.uint8],
         points: PointStore,
+        moved: Floats,
         ratios: Floats,
         trust: Floats,
         segments: Floats,
-        horizon: float,
+        ego: EgoMotion,
         farthest: float,
     ) -> None:
         """Advance by one frame.
@@ -69,21 +75,23 @@ class VehicleStore:
         Args:
             grey: (h, w).
             points: Followed into this frame; their owners are updated.
+            moved: (N, 2) displacement of each point over `CORRELATION` seconds, px.
             ratios: (N,) log likelihood ratio of each point's motion.
             trust: (N,) in [0, 1], how far the picture fixes it.
             segments: (M, 6) horizontal segments.
-            horizon: Row, px.
+            ego: The camera's own motion.
             farthest: Least height of the horizon above a contact row, px: beyond that no vehicle is begun.
         """
+        horizon = float(ego.focus[1])
         for vehicle in self.vehicles:
-            self._carry(vehicle, points)
-            self._weigh(vehicle, points, ratios, trust)
+            self._carry(vehicle, points, moved)
+            self._weigh(vehicle, points, ratios, trust, ego)
             self._hold(vehicle, grey, points, horizon)
         self._end(grey, points, horizon)
-        self._join(points, ratios)
-        self._begin(grey, points, segments, horizon, farthest)
+        self._join(points, ego.speed)
+        self._begin(grey, points, moved, segments, horizon, farthest)
 
-    def _carry(self, vehicle: Vehicle, points: PointStore) -> None:
+    def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats) -> None:
         """Move the box with its points."""
         own = np.flatnonzero((points.owner == vehicle.id) & (points.age >= 1))
         box = vehicle.box
@@ -94,7 +102,13 @@ class VehicleStore:
             away = points.position[own] - np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])]) - shift
             expected = shift + vehicle.growth * away
             off = np.abs(flow - expected).max(1)
-            bad = off > 1.2 + 0.03 * (box[2] - box[0])
+            wide = box[2] - box[0]
+            bad = off > 1.0 + 0.02 * wide
+            if len(own) >= 3:
+                # Over a longer time bodies come apart that a frame does not tell apart.
+                long = moved[own] - vehicle.growth * self._rate * CORRELATION * away
+                off = np.abs(long - np.median(long, axis=0)).max(1)
+                bad |= (points.age[own] >= 4) & (off > 2.0 * BODY_PLAY + 2.0 * BODY_SHARE * wide)
             points.owner[own[bad]] = 0
             own, flow, away = own[~bad], flow[~bad], away[~bad]
         vehicle.members = len(own)
@@ -104,7 +118,8 @@ class VehicleStore:
                 centred = away - away.mean(0)
                 power = float((centred * centred).sum())
                 scale = float((centred * (flow - flow.mean(0))).sum()) / max(power, 30.0)
-                trust = power / (power + 150.0)
+                self._measure_scale(vehicle, scale, power)
+                trust = power / (power + 2000.0)
                 vehicle.growth += 0.3 * trust * (float(np.clip(scale, -0.05, 0.05)) - vehicle.growth)
             middle_shift = shift - vehicle.growth * np.median(away, axis=0)
             vehicle.velocity += 0.3 * (middle_shift - vehicle.velocity)
@@ -117,29 +132,84 @@ class VehicleStore:
         half = 0.5 * np.array([box[2] - box[0], box[3] - box[1]]) * (1.0 + vehicle.growth)
         vehicle.box = np.concatenate([middle - half, middle + half])
 
-    def _weigh(self, vehicle: Vehicle, points: PointStore, ratios: Floats, trust: Floats) -> None:
+    def _measure_scale(self, vehicle: Vehicle, scale: float, power: float) -> None:
+        """Average the rate at which the points of a vehicle move apart, 1/s (scale divergence)."""
+        gain = max(1.0 / (self._rate * 0.6), 1.0 / (vehicle.age + 1.0))
+        vehicle.rate_of_scale += gain * (float(np.clip(scale, -0.1, 0.1)) * self._rate - vehicle.rate_of_scale)
+        noise = 1.5 * FLOW_NOISE * self._rate / np.sqrt(max(power, 30.0))
+        vehicle.rate_error = float(noise * np.sqrt(gain))
+
+    def _divergence(self, vehicle: Vehicle, contact: float, ego: EgoMotion) -> float:
+        """Return the log likelihood ratio of a vehicle's growth: what is static grows by g times its height of horizon."""
+        least = ego.ground * contact
+        if vehicle.members < 3 or vehicle.age < 0.3 * self._rate:
+            return 0.0
+        depth = ego.focal * HEIGHT / max(contact, 3.0)
+        own = np.hypot(vehicle.rate_error, (CLOSING + CLOSING_SHARE * ego.speed) / depth)
+        other = np.hypot(vehicle.rate_error, 0.2 * least + 0.02)
+        as_vehicle = -0.5 * (vehicle.rate_of_scale / own) ** 2 - np.log(own)
+        as_static = -0.5 * (min(vehicle.rate_of_scale - least, 0.0) / other) ** 2 - np.log(other)
+        return float(np.clip(as_vehicle - as_static, -2.0, 2.0))
+
+    def _weigh(
+        self, vehicle: Vehicle, points: PointStore, ratios: Floats, trust: Floats, ego: EgoMotion
+    ) -> None:
         """Add this frame's evidence, once per correlation time."""
         own = (points.owner == vehicle.id) & (points.age >= 4)
         worth = float(trust[own].sum())
         if worth > 0.3:
             mean = float((np.clip(ratios[own], -4.0, 4.0) * trust[own]).sum()) / worth
-            gain = mean * min(worth, 4.0) / 2.0 / (self._rate * CORRELATION)
-            vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
+            gain = float(np.clip(mean, -2.0, 2.0)) * min(worth / 2.0, 1.0) / (self._rate * CORRELATION)
+        else:
+            # Nothing speaks for it any more: while the ego moves, old evidence fades.
+            gain = -vehicle.odds * min(ego.speed / 10.0, 1.0) / (2.0 * self._rate)
+        gain += 0.7 * self._divergence(vehicle, float(vehicle.box[3] - ego.focus[1]), ego) / (self._rate * CORRELATION)
+        gain -= self._ill_filled(vehicle, points) / (self._rate * CORRELATION)
+        gain -= self._alike(vehicle, points) / (self._rate * CORRELATION)
+        vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
         if vehicle.odds > CONFIRM and vehicle.age >= 0.2 * self._rate and vehicle.members >= 2:
             vehicle.confirmed = True
+
+    def _ill_filled(self, vehicle: Vehicle, points: PointStore) -> float:
+        """Return how badly the vehicle's points fill its box, [0, 2]: a box that drifted off is to be found anew."""
+        own = points.position[points.owner == vehicle.id]
+        if len(own) < 3:
+            return 0.0
+        box = vehicle.box
+        sums = own.sum(0)
+        squares = (own * own).sum(0)
+        cost = misfit(float(len(own)), *sums, *squares, box[0], box[3], box[2] - box[0])
+        return float(np.clip(cost - 1.5, 0.0, 3.0))
+
+    def _alike(self, vehicle: Vehicle, points: PointStore) -> float:
+        """Return how much the surroundings move like the vehicle itself, [0, 2]: then it is a piece of them."""
+        box = vehicle.box
+        wide, tall = box[2] - box[0], box[3] - box[1]
+        x, y = points.position.T
+        ring = (x > box[0] - 0.6 * wide) & (x < box[2] + 0.6 * wide)
+        ring &= (y > box[1] + 0.3 * tall) & (y < box[3] + 0.3 * tall)
+        ring &= (points.owner == 0) & (points.age >= 6)
+        like = int((ring & (points.evidence > 1.0)).sum())
+        unlike = int((ring & (points.evidence < -0.5)).sum())
+        return 2.0 * max(like - unlike - 1, 0) / (like + unlike + vehicle.members + 1.0)
 
     def _hold(self, vehicle: Vehicle, grey: NDArray[np.uint8], points: PointStore, horizon: float) -> None:
         """Pull the box to the edges of the picture."""
         own = points.owner == vehicle.id
         box = vehicle.box
-        roof = float(points.position[own, 1].min()) if own.any() else float(box[1])
+        body = _body(points.position[own], box)
         young = vehicle.age < 0.5 * self._rate
-        found = fit_extent(grey, box, loose=0.15 if young else 0.08, roof=roof)
+        found = fit_extent(grey, box, loose=0.15 if young else 0.08, body=body)
         wide, contact = found.box[2] - found.box[0], found.box[3] - horizon
         clear = min(found.sides, 1.5) + 0.5 * min(max(found.foot, 0.0), 1.5)
         vehicle.clear += 0.1 * (clear - vehicle.clear)
         if contact <= 2.0 or not SLIMMEST * contact < wide < WIDEST * contact:
             return
+        # A vehicle keeps its width in metres, which its width over the height of the horizon is.
+        ratio = np.log(wide / contact)
+        if not young and abs(ratio - vehicle.log_width) > 0.2:
+            return
+        vehicle.log_width += (0.2 if young else 0.02) * (ratio - vehicle.log_width)
         gain = (0.3 if young else 0.12) * min(clear / 1.2, 1.0)
         vehicle.box = box + gain * (found.box - box)
 
@@ -168,7 +238,7 @@ class VehicleStore:
                 kept.append(vehicle)
         self.vehicles = sorted(kept, key=lambda one: one.id)
 
-    def _join(self, points: PointStore, ratios: Floats) -> None:
+    def _join(self, points: PointStore, moving: float) -> None:
         """Give new points on a vehicle to it, and take back those that lie outside."""
         x, y = points.position.T
         for vehicle in self.vehicles:
@@ -178,16 +248,23 @@ class VehicleStore:
             far = (x < box[0] - 0.12 * wide) | (x > box[2] + 0.12 * wide)
             far |= (y < box[1] - 0.25 * tall) | (y > box[3] + 0.08 * tall)
             points.owner[own & far] = 0
-            inside = (x > box[0] - 0.02 * wide) & (x < box[2] + 0.02 * wide)
-            inside &= (y > box[1] - 0.1 * tall) & (y < box[3] + 0.02 * tall)
+            inside = (x > box[0] + 0.03 * wide) & (x < box[2] - 0.03 * wide)
+            inside &= (y > box[1] + 0.03 * tall) & (y < box[3] + 0.02 * tall)
             middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])])
             expected = vehicle.velocity + vehicle.growth * (points.position - middle)
             along = np.abs(points.flow - expected).max(1) < 0.7 + 0.01 * wide
-            fresh = inside & along & (points.owner == 0) & (points.age >= 2) & (ratios > -1.5)
+            fresh = inside & along & (points.owner == 0) & (points.age >= 3)
+            fresh &= (points.evidence > 0.3) | (moving < 2.0)
             points.owner[fresh] = vehicle.id
 
     def _begin(
-        self, grey: NDArray[np.uint8], points: PointStore, segments: Floats, horizon: float, farthest: float
+        self,
+        grey: NDArray[np.uint8],
+        points: PointStore,
+        moved: Floats,
+        segments: Floats,
+        horizon: float,
+        farthest: float,
     ) -> None:
         free = (points.owner == 0) & (points.age >= 4)
         likely = free & (points.evidence > 1.0)
@@ -201,7 +278,9 @@ class VehicleStore:
             ]
         )
         windows = windows[windows[:, 3] - horizon >= farthest]
-        for window in propose(windows, position[free], points.evidence[free], horizon, least=4.0):
+        for window in propose(
+            windows, position[free], moved[free], points.evidence[free], horizon, least=4.0
+        ):
             self._try(window, grey, points, free, horizon, farthest)
 
     def _try(
@@ -214,8 +293,8 @@ class VehicleStore:
         farthest: float,
     ) -> None:
         inside = _inside(points.position, window, 0.05) & free & (points.evidence > 0.5)
-        roof = float(points.position[inside, 1].min()) if inside.any() else float(window[1])
-        found = fit_extent(grey, window, loose=0.3, roof=roof)
+        body = _body(points.position[inside], window)
+        found = fit_extent(grey, window, loose=0.3, body=body)
         box = found.box
         wide, contact = box[2] - box[0], box[3] - horizon
         if contact < farthest or not SLIMMEST * contact < wide < WIDEST * contact:
@@ -228,7 +307,7 @@ class VehicleStore:
         good = members & (points.evidence > 0.5)
         if good.sum() < 2 or (members & (points.evidence < -0.8)).sum() > 0.5 * good.sum():
             return
-        vehicle = Vehicle(id=self._next_id, box=box)
+        vehicle = Vehicle(id=self._next_id, box=box, log_width=float(np.log(wide / contact)))
         self._next_id += 1
         flow = points.flow[good]
         vehicle.velocity = np.median(flow, axis=0)
@@ -236,6 +315,14 @@ class VehicleStore:
         vehicle.members = int(good.sum())
         points.owner[good] = vehicle.id
         self.vehicles.append(vehicle)
+
+
+def _body(position: Floats, box: Floats) -> Floats:
+    """Return the box of a vehicle's points (N, 2), or what is most likely of its own where they are too few."""
+    if len(position) >= 3:
+        return np.concatenate([np.quantile(position, 0.1, axis=0), np.quantile(position, 0.9, axis=0)])
+    wide = box[2] - box[0]
+    return box + np.array([0.1, 0.15, -0.1, -0.15]) * wide
 
 
 def _inside(position: Floats, box: Floats, play: float) -> NDArray[np.bool_]:

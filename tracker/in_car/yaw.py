@@ -79,6 +79,7 @@ class EgoMotion:
     """Estimates the camera's motion. Working px; y counts downward from the focus of expansion.
 
     Attributes:
+        focal: Px.
         focus: (2,) focus of expansion; its row is the horizon.
         ground: g = V / (f H), 1/(px s): expansion of the road per px below the horizon.
         yaw_rate: R_y, rad/s, positive to the right.
@@ -94,10 +95,10 @@ class EgoMotion:
             sure: Whether the camera is calibrated, so that the focus lies near the principal point.
             rate: Frames a second.
         """
-        self._focal, self._rate = focal, rate
+        self.focal, self._rate = focal, rate
         self.focus = np.array(focus, float)
         self._expected = self.focus.copy()
-        spread = np.array([12.0, 6.0]) if sure else np.array([45.0, 35.0])
+        spread = np.array([12.0, 6.0]) if sure else np.array([60.0, 60.0])
         self._information = np.diag(1.0 / spread**2)
         self._vector = self._information @ self.focus
         self._prior_information, self._prior_vector = self._information.copy(), self._vector.copy()
@@ -105,8 +106,14 @@ class EgoMotion:
         self._ground_spread = 0.8
         self.yaw_rate = 0.0
         self.shift = np.zeros(2)
+        self._drift = 0.0
         self._per_speed = 1.0 / (focal * HEIGHT)
         self._calibrated = 0.0
+
+    @property
+    def speed(self) -> float:
+        """The ego's speed, m/s, as far as the camera's height is the usual one."""
+        return self.ground * self.focal * HEIGHT
 
     def rotate(self, position: Floats, flow: Floats, weight: Floats) -> Floats:
         """Estimate the rotation since the last frame and return the flow that it caused at each point.
@@ -117,28 +124,31 @@ class EgoMotion:
             weight: (N,) 0 for new points, little for those on vehicles.
         """
         relative = position - self.focus
-        usual = -self.yaw_rate * self._focal / self._rate
+        usual = -self.yaw_rate * self.focal / self._rate
         a, b = _rotation(
             relative[:, 0] - 0.5 * flow[:, 0],
             relative[:, 1] - 0.5 * flow[:, 1],
             flow[:, 0],
             flow[:, 1],
             weight,
-            self._focal,
+            self.focal,
             -usual,
             0.0,
             0.7,
             3.0,
             FLOW_NOISE,
         )
+        # A car does not pitch one way for long: a lasting mean comes from a focus that is off, and is left to move it.
+        self._drift += min(1.0, 0.5 / self._rate) * (b - self._drift)
+        b -= self._drift
         self.shift = np.array([-a, b])
-        measured = a * self._rate / self._focal
+        measured = a * self._rate / self.focal
         self.yaw_rate += min(1.0, 6.0 / self._rate) * (measured - self.yaw_rate)
         return self.rotational_flow(position, a, b)
 
     def rotational_flow(self, position: Floats, a: float, b: float) -> Floats:
         """Return the flow (N, 2) of a rotation that moves the middle by (-a, b)."""
-        x, y = (position - self.focus).T / self._focal
+        x, y = (position - self.focus).T / self.focal
         return np.stack([-a * (1.0 + x * x) + b * x * y, b * (1.0 + y * y) - a * x * y], 1)
 
     def expansion(self, position: Floats, moved: Floats, seconds: Floats) -> tuple[Floats, Floats]:
