@@ -91,7 +91,7 @@ def follow(
 
             write_tracks(directory / "tracks.txt", log.tracks)
             write_json(directory / "summary.json", document)
-            recorder.finish(None, None, None, focal=focal)
+            recorder.finish(None, document, None, focal=focal)
     return document
 
 

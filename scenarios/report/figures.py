@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from scenarios.log import EpisodeLog
 from scenarios.report import plots
 from scenarios.report.history import TraceSamples
-from scenarios.report.palette import CLASSES, LABELS, SERIES
+from scenarios.report.palette import CLASSES, LABELS
 from scenarios.report.plots import Plot
 from scenarios.report.series import Series, measure
 from scenarios.score.params import Boxes
+from tracker.types import Status
 
 if TYPE_CHECKING:
     from scenarios.report.page import Recording
@@ -61,7 +62,7 @@ def draw(recording: Recording, *, log: EpisodeLog | None, boxes: Boxes, scenario
         profiles=_profiles(recording, samples),
         maps=maps,
         maps_note=note,
-        classes=list(by_class) if series is not None else [],
+        classes=list(by_class),
         times=_times(recording, samples, log, series),
     )
 
@@ -93,11 +94,12 @@ def _profiles(recording: Recording, samples: TraceSamples) -> list[Plot]:
 
 
 def _by_class(samples: TraceSamples, series: Series | None) -> dict[str, NDArray[np.bool_]]:
-    """Return which samples are of each true class, in the classes' own order; without truth all are one."""
+    """Return which samples are of each true class, or where the truth is not known, of each label."""
     if series is None:
-        return {"all": np.ones(len(samples.ids), bool)}
-    names = np.array([series.classes.get(int(trace)) for trace in samples.ids], dtype=object)
-    masks = {name: names == name for name in CLASSES}
+        masks = {label.name.lower(): samples.labels == label for label in LABELS}
+    else:
+        names = np.array([series.classes.get(int(trace)) for trace in samples.ids], dtype=object)
+        masks = {name: names == name for name in CLASSES}
     return {name: mask for name, mask in masks.items() if mask.any()}
 
 
@@ -113,12 +115,13 @@ def _maps(
     from tracker.in_car.likelihood import MotionModel, MotionPriors  # compiles kernels
 
     camera = (scenario.get("in_car") or {}).get("camera") or {}
-    focal = recording.focal or camera.get("focal") or DEFAULT_FOCAL * recording.width / 640
-    priors = MotionPriors()
-    speed = priors.speed
+    focal = recording.focal or camera.get("focal")
+    focal_said = "" if focal else " (assumed)"
+    focal = focal or DEFAULT_FOCAL * recording.width / 640
+    priors, speed_said = MotionPriors(), " (assumed)"
     if log is not None and np.isfinite(log.ego_speed).any():
-        speed = max(float(np.nanmedian(log.ego_speed)), 1.0)
-    model = MotionModel(focal, MotionPriors(speed=speed))
+        priors, speed_said = MotionPriors(speed=max(float(np.nanmedian(log.ego_speed)), 1.0)), ""
+    model = MotionModel(focal, priors)
     x = np.linspace(-recording.width / 2, recording.width / 2, 129)
     v = np.linspace(-MAX_SPEED, MAX_SPEED, 121)
     grid_x, grid_v = np.meshgrid(x, v)
@@ -136,9 +139,9 @@ def _maps(
         "Red-violet speaks for a car, green for background; on the line they are equally likely.",
     )
     note = (
-        f"Densities of image place and image speed, without yaw, at a focal length of {focal:.0f} px and"
-        f" {speed:.1f} m/s. The dots are samples of this run's traces"
-        + (", coloured by what they truly are." if log is not None else ".")
+        f"Densities of image place and image speed, without yaw, at a focal length of {focal:.0f} px{focal_said} and"
+        f" {priors.speed:.1f} m/s{speed_said}. The dots are samples of this run's traces, coloured by"
+        + (" what they truly are." if log is not None else " their label.")
     )
     return [
         Plot(title=title, caption=caption, svg=svg)
@@ -178,8 +181,11 @@ def _times(
             plots.lines({"IoU": (times, series.overlap)}, seconds=seconds, label="mean IoU", limits=(0, 1)),
         )
     if len(samples.ids):
-        add(*_counts(samples, recording, seconds))
-        add(*_belief(samples, series, recording, seconds))
+        add(*_traces(samples, recording, seconds))
+        if series is not None:
+            add(*_belief(samples, series, recording, seconds))
+    if series is None and recording.history.track_counts().any():
+        add(*_tracks(recording, seconds))
     if log is not None and np.isfinite(log.ego_speed).any() and len(log.ego_speed) == len(times):
         add(
             "Speed of the camera car",
@@ -210,7 +216,24 @@ def _times(
     return drawn
 
 
-def _counts(
+def _tracks(recording: Recording, seconds: float) -> tuple[str, str, tuple[Any, plots.TimeAxis]]:
+    """Draw how many tracks of each status there are in a frame."""
+    counts = recording.history.track_counts().astype(float)
+    times: Floats = np.asarray(
+        (np.arange(len(counts)) * recording.history.stride + 0.5) / recording.rate, float
+    )
+    drawing = plots.lines(
+        {status.name.lower(): (times, counts[:, status]) for status in Status},
+        seconds=seconds,
+        label="tracks",
+        limits=(0, None),
+        colours=("#9aa0aa", "#3b82f6", "#f59e0b"),
+        steps=True,
+    )
+    return "Tracks", "Tracks in a frame, by how sure the tracker is of them.", drawing
+
+
+def _traces(
     samples: TraceSamples, recording: Recording, seconds: float
 ) -> tuple[str, str, tuple[Any, plots.TimeAxis]]:
     """Draw how many traces of each label there are in a frame."""
@@ -231,7 +254,7 @@ def _counts(
 
 
 def _belief(
-    samples: TraceSamples, series: Series | None, recording: Recording, seconds: float
+    samples: TraceSamples, series: Series, recording: Recording, seconds: float
 ) -> tuple[str, str, tuple[Any, plots.TimeAxis]]:
     """Draw p(car) of the traces by true class over time, in windows of half a second."""
     masks = _by_class(samples, series)
@@ -247,8 +270,6 @@ def _belief(
         quartiles[name] = ((edges[:-1] + edges[1:]) / 2, rows[0], rows[1], rows[2])
     return (
         "Belief in a car",
-        "p(car) of the traces"
-        + (" by what they truly are" if series is not None else "")
-        + ": medians and quartiles over half a second.",
-        plots.bands(quartiles, seconds=seconds, label="p(car)", colours={**CLASSES, "all": SERIES[0]}),
+        "p(car) of the traces by what they truly are: medians and quartiles over half a second.",
+        plots.bands(quartiles, seconds=seconds, label="p(car)", colours=CLASSES),
     )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.types import Traces
+from tracker.types import Status, Traces, Tracks
 
 MAX_ROWS = 4096
 """Rows kept of a temporal profile; a longer run keeps every second one, then every fourth, ..."""
@@ -103,13 +104,20 @@ class History:
         self._thinned = Thinned(MAX_ROWS)
         self._profiles: dict[str, ProfileRows] = {}
         self._traces: list[TraceSamples] = []
+        self._counts: list[NDArray[np.int64]] = []
 
     @property
     def stride(self) -> int:
         """Frames from one kept row to the next."""
         return self._thinned.stride
 
-    def add(self, index: int, profiles: dict[str, NDArray[np.float32]], traces: Traces | None) -> None:
+    def add(
+        self,
+        index: int,
+        tracks: Tracks,
+        profiles: Mapping[str, NDArray[np.float32]],
+        traces: Traces | None,
+    ) -> None:
         """Take in frame ``index`` of the run, from 0."""
         if not self._thinned.wants(index):
             return
@@ -119,14 +127,20 @@ class History:
         for name, rows in self._profiles.items():
             rows.add(profiles.get(name))
         self._traces.append(_samples(index, traces))
+        self._counts.append(np.bincount(tracks.status, minlength=len(Status)))
         if self._thinned.added():
             for rows in self._profiles.values():
                 rows.halve()
             self._traces = self._traces[::2]
+            self._counts = self._counts[::2]
 
     def profiles(self) -> dict[str, NDArray[np.uint8]]:
         """Return the (T, W) temporal profiles by name."""
         return {name: rows.image() for name, rows in self._profiles.items()}
+
+    def track_counts(self) -> NDArray[np.int64]:
+        """Return how many tracks of each `Status` there were: (T, 3), one row a kept frame."""
+        return np.array(self._counts, np.int64).reshape(-1, len(Status))
 
     def traces(self) -> TraceSamples:
         """Return the kept samples, in order of time."""

@@ -15,7 +15,7 @@ from markupsafe import Markup
 from scenarios.log import EpisodeLog
 from scenarios.report import figures
 from scenarios.report.history import History
-from scenarios.report.palette import CLASSES, LABELS, NO_TRACK
+from scenarios.report.palette import DOTS, LABELS, NO_TRACK
 from scenarios.report.tables import (
     BOX_SCORES,
     MEANINGS,
@@ -119,7 +119,7 @@ def write_page(
         path: The file to write.
         recording: Of the run.
         log: Of the episode, or None for a recording.
-        scores: The document that ``--json`` prints, or None for a recording.
+        scores: The document that ``--json`` prints; of a recording it has no scores in it.
         scenario: As resolved, or None for a recording.
     """
     document = scores or {}
@@ -141,11 +141,12 @@ def write_page(
             film_note=_film_note(recording),
             has_truth=log is not None,
             label_colours=[(label.name.lower(), colour) for label, colour in LABELS.items()],
-            map_colours=[(name, CLASSES[name]) for name in drawn.classes],
+            map_colours=[(name, DOTS[name]) for name in drawn.classes],
             no_track=NO_TRACK,
             tiles=_tiles(values, has_boxes=has_boxes, has_traces=has_traces),
             tables=_tables(values, has_boxes=has_boxes, has_traces=has_traces),
             confusion=confusion(values),
+            facts=plain_rows(_facts(document)) if not values else [],
             difficulty=plain_rows(document.get("difficulty") or {}),
             profiles=drawn.profiles,
             maps=drawn.maps,
@@ -191,8 +192,8 @@ def _chips(
     chips = []
     if log is not None:
         chips = [("scenario", log.scenario), ("seed", str(log.seed)), ("tracker", log.tracker)]
-    elif "tracker" in document:
-        chips = [("tracker", str(document["tracker"]))]
+    elif "method" in document:
+        chips = [("recording", str(document.get("video", ""))), ("tracker", str(document["method"]))]
     chips.append(("length", f"{recording.frames / recording.rate:.1f} s"))
     chips.append(("frames", f"{recording.frames} at {recording.rate:g} a second"))
     if document.get("fps") is not None:
@@ -200,6 +201,12 @@ def _chips(
     if document.get("peak_rss_mb") is not None:
         chips.append(("memory", f"{document['peak_rss_mb']:.0f} MB at most"))
     return chips
+
+
+def _facts(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the document of a recording says of what was found."""
+    facts = {name: document[name] for name in ("tracks", "boxes", "focal") if document.get(name) is not None}
+    return facts | {f"{stage}, ms a frame": ms for stage, ms in (document.get("timing_ms") or {}).items()}
 
 
 def _tiles(values: Mapping[str, Any], *, has_boxes: bool, has_traces: bool) -> list[Row]:

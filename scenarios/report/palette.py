@@ -18,6 +18,9 @@ LABELS = {Label.CAR: "#ef4444", Label.BACKGROUND: "#22a06b", Label.UNDECIDED: "#
 CLASSES = {"car": "#ef4444", "background": "#22a06b", "oncoming": "#7c6cf2"}
 """Of scored traces, by what they truly are."""
 
+DOTS = CLASSES | {"undecided": LABELS[Label.UNDECIDED]}
+"""Of samples on the maps: by class where the truth is known, else by label."""
+
 NO_TRACK = "#6b7280"
 """Of traces that belong to no track."""
 

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from scenarios.report.history import TraceSamples
-from scenarios.report.palette import CLASSES, LABELS, NO_TRACK, SERIES, identity
+from scenarios.report.palette import DOTS, LABELS, NO_TRACK, SERIES, identity
 from tracker.types import Label
 
 Floats = NDArray[np.float64]
@@ -233,7 +233,7 @@ def _finish_map(
     for name, (x, v) in samples.items():
         # White beneath the colour: a dot has to be seen on every shade of the map.
         axes.scatter(x, v, s=5, color="white", linewidths=0, rasterized=True, zorder=3)
-        axes.scatter(x, v, s=2.5, color=CLASSES.get(name, SERIES[0]), linewidths=0, rasterized=True, zorder=4)
+        axes.scatter(x, v, s=2.5, color=DOTS[name], linewidths=0, rasterized=True, zorder=4)
     axes.grid(visible=False)
     axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="x from the principal point, px", ylabel="v, px/s")
     bar = axes.figure.colorbar(image, ax=axes, pad=0.03, fraction=0.06)  # type: ignore[arg-type]

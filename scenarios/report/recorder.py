@@ -93,7 +93,7 @@ class Recorder:
         index = self._frames
         self._frames += 1
         diagnostics = diagnostics or Diagnostics()
-        self._history.add(index, diagnostics.profiles, diagnostics.traces)
+        self._history.add(index, tracks, diagnostics.profiles, diagnostics.traces)
 
         filmed = index < FILM_SECONDS * self.rate
         kept = self._stills.wants(index)
@@ -127,7 +127,7 @@ class Recorder:
 
         Args:
             log: Of the episode; None for a recording, of which no truth is known.
-            scores: The document that ``--json`` prints for this run; None for a recording.
+            scores: The document that ``--json`` prints for this run; of a recording it has no scores in it.
             scenario: As resolved, plain values by name; None for a recording.
             focal: Of the camera, px, where the scenario does not say it.
             figures: More pictures to show, such as frames of a recording beside simulated ones.

@@ -145,12 +145,14 @@ def test_recording_without_truth(found: list[episode.Step], tmp_path: Path) -> N
     with recorder(tmp_path) as running:
         for image, tracks, diagnostics, _ in found:
             running.frame(image, tracks, diagnostics)
-        page = Page(running.finish(None, None, None, focal=200.0).read_text("utf-8"))
+        document = {"video": "a.mp4", "method": "in-car", "tracks": 12345, "timing_ms": {"decode": 1.5}}
+        page = Page(running.finish(None, document, None, focal=200.0).read_text("utf-8"))
     text = " ".join(page.words)
     assert "This is a recording" in text
     assert "Confusion" not in text
     assert "scored object" not in text
-    assert "focal length of 200 px" in text
+    assert "focal length of 200 px and 15.0 m/s (assumed)" in text
+    assert {"a.mp4", "12345", "1.500"} <= {word.strip() for word in page.words}
     assert len(decode(page.film())) == episode.FRAMES
 
 
@@ -310,8 +312,9 @@ def test_history_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
         profiles = {"segments": np.full(8, index, np.float32)}
         if index >= 64:
             profiles["late"] = np.ones(8, np.float32)
-        history.add(index, profiles, None)
+        history.add(index, Tracks.none(), profiles, None)
     images = history.profiles()
+    assert history.track_counts().shape == (len(images["late"]), 3)
     assert images["segments"].shape == images["late"].shape
     assert images["segments"].shape[0] <= 32
     assert images["segments"].shape[0] * history.stride >= 1000
