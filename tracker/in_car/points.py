@@ -116,7 +116,7 @@ class PointStore:
     def frozen(self, *, play: float = 0.4) -> NDArray[np.bool_]:
         """Tell which points (N,) have not moved in the picture at all over their remembered past."""
         moved = np.abs(self._past - self._past[:, -1:]).max(axis=(1, 2))
-        return np.asarray((moved < play) & (self.age >= self._memory - 1))
+        return np.asarray((moved < play) & (self.age >= 4))
 
     def refill(self, grey: NDArray[np.uint8], horizon: float) -> None:
         """Add corners where there are none: sparsely above the horizon, densely where far vehicles lie, then the road."""

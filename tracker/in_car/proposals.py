@@ -21,6 +21,8 @@ SLIMMEST, USUAL, WIDEST = 0.85, 1.45, 2.6
 ROOM, ROOM_WIDTH = 200.0, 60.0
 
 
+# Log odds beyond which more points add nothing: how well they fill a window is to decide, not how many they are.
+ENOUGH = 50.0
 # How far the points of one body may move apart over the remembered time: px, and as a share of its width.
 BODY_PLAY, BODY_SHARE = 1.0, 0.02
 # Where the points of a vehicle lie in its window, as shares of its width: their mean above the ground, with its play, and
@@ -87,7 +89,7 @@ def _score(windows, x, y, u, v, evidence, horizon):  # type: ignore[no-untyped-d
         scatter = max(suu - (su * su + sv * sv) / s, 0.0) / s
         cost += scatter / (BODY_PLAY + BODY_SHARE * wide) ** 2
         scores[k, 0] = (
-            total * np.exp(-0.8 * cost)
+            min(total, ENOUGH) * np.exp(-0.8 * cost)
             - 0.3 * beside
             - wide * tall / (ROOM * max(1.0, wide / ROOM_WIDTH) ** 2)
         )

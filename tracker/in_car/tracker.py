@@ -74,15 +74,15 @@ class InCarTracker:
         direction = relative / np.maximum(np.hypot(relative[:, 0], relative[:, 1]), 1.0)[:, None]
         trust = np.clip((stiffness(grey, points.position, direction) - 0.05) / 0.15, 0.0, 1.0)
         ripe = points.age >= RIPE
-        still = ripe & (points.evidence < 2.0) & (points.owner == 0)
+        # So near, no vehicle keeps its place to a fraction of a pixel: the bonnet does, and dirt, and writing in the picture.
+        painted = points.frozen() & (relative[:, 1] > NEAR_ROWS * grey.shape[1])
+        still = ripe & ~painted & (points.evidence < 2.0) & (points.owner == 0)
         speed = frame.odometry.speed if frame.odometry else None
         ego.learn(points.position, moved, seconds, still * trust, speed)
         relative = points.position - ego.focus
         ratios = trust * motion_evidence(
             relative, moved, seconds, ground=ego.ground, focal=focal, yaw_rate=ego.yaw_rate
         )
-        # So near, no vehicle keeps its place to a fraction of a pixel: the bonnet does, and dirt, and writing in the picture.
-        painted = points.frozen() & (relative[:, 1] > NEAR_ROWS * grey.shape[1])
         ratios[painted] = np.minimum(ratios[painted], -1.0)
         gain = np.where(ripe, np.clip(ratios, -4.0, 4.0), 0.0) / (self._info.rate * CORRELATION)
         points.evidence = np.clip(points.evidence + gain, -6.0, 6.0)

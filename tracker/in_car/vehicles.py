@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 CONFIRM, REJECT = 2.5, -1.5
 # Bounds of the log odds: old evidence must not outlast new evidence for too long.
 LOWEST, HIGHEST = -6.0, 8.0
+# The nearest vehicle that is begun is this many times nearer than the farthest.
+NEAREST_SHARE = 12.0
 # Seconds over which the points' evidence is worth once itself: the span of the displacements.
 CORRELATION = 0.35
 
@@ -277,7 +279,8 @@ class VehicleStore:
                 windows_from_segments(segments, horizon),
             ]
         )
-        windows = windows[windows[:, 3] - horizon >= farthest]
+        contact = windows[:, 3] - horizon
+        windows = windows[(contact >= farthest) & (contact <= NEAREST_SHARE * farthest) & (windows[:, 3] < len(grey))]
         for window in propose(
             windows, position[free], moved[free], points.evidence[free], horizon, least=4.0
         ):
