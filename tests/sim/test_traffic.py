@@ -156,7 +156,7 @@ def small_network():
     return network
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(places=st.lists(place, min_size=2, max_size=9), connected=st.booleans(), objects=st.integers(0, 2))
 def test_queries_are_those_of_stock_highway_env(places, connected, objects):
     network = small_network()
@@ -200,7 +200,7 @@ def test_no_class_state_leaks_between_worlds():
             env.step(env.action_space.sample() * 0)
             env.close()
             assert before != (IDMVehicle.COMFORT_ACC_MAX, IDMVehicle.DISTANCE_WANTED)
-        for _ in range(60):
+        for _ in range(15):
             run_of.step()
         return run_of.vehicles().positions.tobytes()
 
@@ -246,7 +246,7 @@ def drive_without_collision(case, seed, seconds=20.0):
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_drive_has_cars_ahead_and_no_collision(case):
-    ahead, egos = drive_without_collision(case, 0, seconds=5.0)
+    ahead, egos = drive_without_collision(case, 0, seconds=3.0)
     assert ahead > 0.5
     yaw = np.unwrap([e.yaw for e in egos])
     rates = np.array([e.yaw_rate for e in egos])
@@ -267,7 +267,7 @@ def test_twenty_seeds_drive_without_collision(case):
 def test_stop_and_go_stops_and_goes():
     run = traffic("stop-and-go", 0)
     speeds, braking = [], False
-    for _ in range(20 * RATE):
+    while len(speeds) < 20 * RATE and not (speeds and min(speeds) < 0.5 and max(speeds) > 5.0 and braking):
         run.step()
         speeds.append(run.ego().speed)
         bodies = run.vehicles()
@@ -317,7 +317,7 @@ def test_vehicles_appear_and_vanish_far_away():
     run = traffic("straight", 3, seconds=30.0)
     bodies = run.vehicles()
     known = dict(zip(bodies.ids.tolist(), bodies.positions, strict=True))
-    for _ in range(20 * RATE):
+    for _ in range(10 * RATE):
         run.step()
         bodies, ego = run.vehicles(), run.ego()
         now = dict(zip(bodies.ids.tolist(), bodies.positions, strict=True))
