@@ -225,7 +225,7 @@ def noise_amplitude(noise: float) -> Floats32:
     curve = (
         np.sqrt(1.0 + 0.03 / (value + 0.08))
         * np.clip(1.25 - 0.6 * value, 0.4, 1.0)
-        * np.clip(0.3 + 6 * value, 0, 1)
+        * np.clip(0.15 + 3 * value, 0, 1)
     )
     return (noise * curve / curve[128]).astype(np.float32)
 

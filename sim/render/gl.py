@@ -13,7 +13,7 @@ from sim.models import Surface
 from sim.render.antialias import smooth_edges
 from sim.render.context import check, context
 from sim.render.ground import MARGIN, cut, grain_texture, mark_table, road_texture
-from sim.render.instances import COMMAND, INSTANCE, Library, in_bands
+from sim.render.instances import COMMAND, CONTACT, INSTANCE, Library, contacts, in_bands
 from sim.render.lamps import HALO, LIGHTS, Burning, LampPlan, halos, lights
 from sim.render.programs import program, set_uniforms
 from sim.render.silhouettes import SilhouettePass
@@ -25,7 +25,11 @@ from sim.world import Bodies, WorldState
 
 _ROOM = 8192  # instances and draws in a frame
 
-_BEAM = 420.0
+_SHADOW_REACH, _SHADOW_WIDEN = (
+    120.0,
+    2.5,
+)  # metres, and half-widths of the frame, in which bodies cast shadows
+_BEAM = 300.0
 _GLOSS = {  # share of the body's colour (2: by the texture's alpha), least reflection, by the alpha, retro-reflection
     Surface.PAINT: (1.0, 0.055, 0.02, 0.0),
     Surface.GLASS: (0.0, 0.22, 0.0, 0.0),
@@ -33,7 +37,7 @@ _GLOSS = {  # share of the body's colour (2: by the texture's alpha), least refl
     Surface.RUBBER: (0.0, 0.0, 0.0, 0.0),
     Surface.PLASTIC: (0.0, 0.02, 0.0, 0.0),
     Surface.PLATE: (0.0, 0.02, 0.0, 6.0),
-    Surface.TAIL_LAMP: (0.0, 0.05, 0.0, 3.0),
+    Surface.TAIL_LAMP: (0.0, 0.05, 0.0, 0.0),
     Surface.HEAD_LAMP: (0.0, 0.12, 0.0, 3.0),
     Surface.CARGO: (1.0, 0.01, 0.0, 0.0),
     Surface.FACADE: (0.0, 0.0, 0.25, 0.0),
@@ -102,6 +106,11 @@ class GlRenderer:
         selection = in_bands(bodies, self._library.select(bodies, camera, pose), pose)
         instances = self._library.instances(bodies, selection, pose)
         commands = self._library.commands(selection.meshes)
+        casters = self._library.select(bodies, camera, pose, widen=_SHADOW_WIDEN, coarsest=True)
+        casters = casters.within(bodies, pose, _SHADOW_REACH)
+        casters = in_bands(bodies, casters, pose)
+        shades = self._library.commands(casters.meshes)
+        resting = contacts(state.vehicles, pose)
         stretches = self._ground.select(camera, pose)
         view = view_matrices(camera, pose)
         burning = self._lamps.burning(bodies, camera, pose, streets=self._streets)
@@ -109,19 +118,22 @@ class GlRenderer:
         with context() as ctx:
             self._instances.write(instances)
             self._commands.write(commands)
+            self._casters.write(self._library.instances(bodies, casters, pose))
+            self._caster_commands.write(shades)
             self._stretches.write(self._ground.stretches(stretches, pose))
             self._ground_commands.write(self._ground.commands(stretches))
             draws = (len(commands), len(stretches))
-            self._shadow_pass(ctx, view, draws, pose)
+            self._shadow_pass(ctx, view, len(shades), pose)
             self._light_up(burning, pose)
             self._main_pass(ctx, view, draws)
+            self._contact_pass(ctx, view, resting)
             self._sky_pass(ctx, camera, pose)
             self._halo_pass(ctx, view, glare)
             rgba, ids, depth = self._read()
             check(ctx, "rendering")
         return Picture(colour=smooth_edges(rgba), ids=ids, depth=depth)
 
-    def _shadow_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int], pose: Pose) -> None:
+    def _shadow_pass(self, ctx: Any, view: dict[str, Any], draws: int, pose: Pose) -> None:
         self._mask.use()
         self._mask.clear()
         sun = self._stage.light.sun
@@ -129,7 +141,7 @@ class GlRenderer:
             return
         ctx.enable_only(ctx.NOTHING)
         set_uniforms(self._body_shadow, **view, u_sun=tuple(sun), u_ground=-float(pose.position[2]))
-        self._body_shadow_array.render_indirect(self._commands, count=draws[0])
+        self._body_shadow_array.render_indirect(self._caster_commands, count=draws)
 
     def _main_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int]) -> None:
         self._target.use()
@@ -183,6 +195,18 @@ class GlRenderer:
                 u_right=(ahead[1], -ahead[0], 0.0),
             )
 
+    def _contact_pass(self, ctx: Any, view: dict[str, Any], resting: NDArray[np.void]) -> None:
+        if not len(resting):
+            return
+        self._resting.write(resting)
+        self._over.use()
+        self._over.depth_mask = False
+        ctx.enable_only(ctx.DEPTH_TEST | ctx.BLEND)
+        ctx.blend_func = ctx.ZERO, ctx.SRC_COLOR
+        set_uniforms(self._contact, **view)
+        self._contact_array.render(ctx.TRIANGLE_STRIP, vertices=4, instances=len(resting))
+        self._over.depth_mask = True
+
     def _halo_pass(self, ctx: Any, view: dict[str, Any], glare: NDArray[np.void]) -> None:
         if not len(glare):
             return
@@ -220,6 +244,9 @@ class GlRenderer:
         self._faces = keep(ctx.buffer(self._library.faces.tobytes()))
         self._instances = keep(ctx.buffer(reserve=_ROOM * INSTANCE.itemsize, dynamic=True))
         self._commands = keep(ctx.buffer(reserve=_ROOM * COMMAND.itemsize, dynamic=True))
+        self._casters = keep(ctx.buffer(reserve=_ROOM * INSTANCE.itemsize, dynamic=True))
+        self._caster_commands = keep(ctx.buffer(reserve=_ROOM * COMMAND.itemsize, dynamic=True))
+        self._resting = keep(ctx.buffer(reserve=_ROOM * CONTACT.itemsize, dynamic=True))
         self._halos = keep(ctx.buffer(reserve=_ROOM * HALO.itemsize, dynamic=True))
         chunks = len(self._ground.first)
         self._ground_vertices = keep(ctx.buffer(self._ground.vertices.tobytes()))
@@ -267,9 +294,9 @@ class GlRenderer:
         night = ("NIGHT",) if light.night else ()
         shared = ("light", "lamps") if light.night else ("light",)
         self._body_shadow = keep(program(ctx, "body", "mask", "SHADOW"))
-        self._body_shadow_array = self._bodies(ctx, self._body_shadow, "3f 24x", "3f 2f 3f 8x/i")
+        self._body_shadow_array = self._bodies(ctx, self._body_shadow, self._casters, "3f 2f 3f 8x/i")
         self._alone = keep(program(ctx, "body", "alone", "ALONE"))
-        alone = self._bodies(ctx, self._alone, "3f 24x", "3f 2f 3f 4x 1u/i", "i_id")
+        alone = self._bodies(ctx, self._alone, self._instances, "3f 2f 3f 4x 1u/i", "i_id")
         self._silhouettes = keep(SilhouettePass(ctx, alone, self._instances, self._commands, self._size))
         self._body = keep(program(ctx, "body", "body", "COLOUR", *night, shared=shared))
         self._body_array = keep(
@@ -330,6 +357,16 @@ class GlRenderer:
             set_uniforms(shader, u_beam=_BEAM, u_street=float(self._streets))
         self._halo = keep(program(ctx, "halo", "halo"))
         self._corners = keep(ctx.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], "<f4").tobytes()))
+        self._contact = keep(program(ctx, "contact", "contact"))
+        self._contact_array = keep(
+            ctx.vertex_array(
+                self._contact,
+                [
+                    (self._corners, "2f", "in_corner"),
+                    (self._resting, "3f 2f 2f/i", "i_position", "i_turn", "i_half"),
+                ],
+            )
+        )
         self._halo_array = keep(
             ctx.vertex_array(
                 self._halo,
@@ -340,13 +377,13 @@ class GlRenderer:
             )
         )
 
-    def _bodies(self, ctx: Any, shader: Any, vertex: str, instance: str, *more: str) -> Any:
+    def _bodies(self, ctx: Any, shader: Any, instances: Any, layout: str, *more: str) -> Any:
         return self._keep(
             ctx.vertex_array(
                 shader,
                 [
-                    (self._vertices, vertex, "in_position"),
-                    (self._instances, instance, "i_position", "i_turn", "i_scale", *more),
+                    (self._vertices, "3f 24x", "in_position"),
+                    (instances, layout, "i_position", "i_turn", "i_scale", *more),
                 ],
                 self._faces,
             )

@@ -34,6 +34,10 @@ COMMAND = np.dtype(
 )
 """One indirect draw of OpenGL."""
 
+CONTACT = np.dtype([("position", "<f4", 3), ("turn", "<f4", 2), ("half", "<f4", 2)])
+"""What a vehicle hides of the sky: its footprint on the ground, relative to the camera."""
+
+_CONTACT_REACH = 90.0
 _NARROWEST_PX = 0.35
 _BANDS_PER_OCTAVE = 2
 
@@ -52,6 +56,13 @@ class Selection:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def within(self, bodies: Bodies, pose: Pose, reach: float) -> Selection:
+        """Keep what stands within ``reach`` metres, and no hills or woods as long as that."""
+        offset = bodies.positions[self.rows] - pose.position
+        kept = (offset * offset).sum(axis=1) < reach * reach
+        kept &= bodies.sizes[self.rows].max(axis=1) < reach
+        return Selection(rows=self.rows[kept], meshes=self.meshes[kept])
 
 
 class Library:
@@ -193,3 +204,15 @@ def _reach(model: Model) -> float:
     """Largest distance of a vertex from half the model's height above its origin."""
     middle = np.array([0.0, 0.0, 0.5 * model.size[2]])
     return max(float(np.sqrt(((mesh.vertices - middle) ** 2).sum(axis=1)).max()) for mesh in model.lods)
+
+
+def contacts(vehicles: Bodies, pose: Pose) -> NDArray[np.void]:
+    """Return (M,) `CONTACT` records of the vehicles that are near and ahead."""
+    offset = vehicles.positions - pose.position
+    ahead = offset @ pose.rotation[2]
+    rows = np.flatnonzero((ahead > -vehicles.sizes[:, 0]) & (ahead < _CONTACT_REACH))
+    out = np.zeros(len(rows), CONTACT)
+    out["position"] = offset[rows]
+    out["turn"] = np.column_stack([np.cos(vehicles.yaws[rows]), np.sin(vehicles.yaws[rows])])
+    out["half"] = 0.5 * vehicles.sizes[rows, :2]
+    return out

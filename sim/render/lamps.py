@@ -21,7 +21,7 @@ HALO = np.dtype([("position", "<f4", 3), ("radius", "<f4"), ("colour", "<f4", 3)
 _REACH = 110.0
 _TAIL, _BRAKE = np.array([0.55, 0.008, 0.006]), np.array([1.5, 0.025, 0.018])
 _HEAD = np.array([1.5, 1.4, 1.2])
-_STREET = np.array([1.0, 0.74, 0.42])
+_STREET = np.array([1.0, 0.70, 0.36])
 _HIGH_LAMP_U = 2.0
 
 
@@ -99,7 +99,7 @@ class LampPlan:
             if lamps & Lamps.HEAD:
                 shown.append((self._head[model], forward + [0.0, 0.0, -0.05], _HEAD, 28.0, 60.0))
             if streets:
-                shown.append((self._street[model], np.array([0.0, 0.0, -1.0]), _STREET, 2.0, 26.0))
+                shown.append((self._street[model], np.array([0.0, 0.0, -1.0]), _STREET, 2.0, 90.0))
             for places, aim, tint, sharpness, reach in shown:
                 for place in places * scale:
                     x, y = cos * place[0] - sin * place[1], sin * place[0] + cos * place[1]
@@ -153,13 +153,13 @@ def halos(burning: Burning, camera: Camera, *, night: bool) -> NDArray[np.void]:
     scale = camera.focal / 800.0
     out["position"] = burning.position[rows]
     glare = (
-        (5.0 + 160.0 / distance[rows])
+        (9.0 + 330.0 / (distance[rows] + 3.0))
         * np.sqrt(bright[rows])
         * np.minimum(1.0, (220.0 / distance[rows]) ** 0.7)
     )
     out["radius"] = np.maximum(scale * glare * (1.0 if night else 0.3), 1.0)
     fade = np.minimum(1.0, 90.0 / distance[rows]) ** 0.6
-    out["colour"] = burning.colour[rows] * (facing[rows] * fade * (0.55 if night else 0.25))[:, None]
+    out["colour"] = burning.colour[rows] * (facing[rows] * fade * (0.9 if night else 0.25))[:, None]
     return out
 
 

@@ -40,10 +40,10 @@ def panorama(light: Light) -> NDArray[np.uint8]:
         glow = 0.22 * np.clip(toward, 0, 1) ** 6 + 0.5 * np.clip(toward, 0, 1) ** 60 + 3.0 * (toward > 0.9996)
         sky += (1 - 0.8 * light.cloud) * glow[..., None] * light.sun_colour * 0.6
     rng = stream(light.seed, "sky")
-    plane = fractal(rng, (_PLANE, _PLANE), 1.55, lowest=4) + 0.35 * fractal(
+    plane = fractal(rng, (_PLANE, _PLANE), 1.7, lowest=3) + 0.22 * fractal(
         rng, (_PLANE, _PLANE), 1.0, lowest=24
     )
-    scale = _PLANE / 14.0 / np.maximum(up, 0.035)
+    scale = _PLANE / 22.0 / np.maximum(up, 0.035)
     x, y = np.broadcast_arrays((east * scale) % _PLANE, (north * scale) % _PLANE)
     density = cv2.remap(
         plane.astype(np.float32),
@@ -59,10 +59,11 @@ def panorama(light: Light) -> NDArray[np.uint8]:
     brightness = 0.25 * light.sun_colour.mean() + 0.75 * np.mean(light.horizon + light.zenith)
     white = np.array([1.0, 1.0, 1.02]) * (0.62 if light.night else 1.0) * brightness
     cloud = white * (1.12 - 0.55 * thick - 0.25 * light.cloud)[..., None]
-    fade = np.clip(up / 0.08, 0, 1)[..., None] * 0.92
+    fade = np.clip(up / 0.22, 0, 1)[..., None] * 0.92
     sky += (cloud - sky) * cover[..., None] * fade
     sky = np.clip(sky, 0, 4)
     shown = np.sqrt(sky * (1 + 0.12 * sky) / (1 + 0.42 * sky * sky))  # film() of the shaders
+    shown *= 0.85 + shown * (0.45 - 0.30 * shown)
     out = np.full((_HEIGHT, _WIDTH, 4), 255, np.uint8)
     out[..., :3] = np.clip(shown, 0, 1) * 255 + 0.5
     return out

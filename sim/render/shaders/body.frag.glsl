@@ -22,7 +22,7 @@ layout(location = 2) out float o_depth;
 vec3 glow(int surface, vec3 plain, float alpha) {
     int lamps = int(v_colour.a * 255.0 + 0.5);
     float tail = (lamps & 2) != 0 ? 2.2 : ((lamps & 1) != 0 && v_uv.x < 2.0 ? 0.7 : 0.0);
-    vec3 sum = surface == TAIL_LAMP ? tail * vec3(1.0, 0.06, 0.04) : vec3(0.0);
+    vec3 sum = surface == TAIL_LAMP ? tail * vec3(1.0, 0.025, 0.02) : vec3(0.0);
     sum += surface == HEAD_LAMP && (lamps & 4) != 0 ? vec3(3.0, 2.9, 2.6) : vec3(0.0);
 #ifdef NIGHT
     sum += surface == STREET_LAMP ? u_street * vec3(3.0, 2.4, 1.5) : vec3(0.0);

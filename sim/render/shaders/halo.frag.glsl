@@ -7,7 +7,6 @@ void main() {
     float r = dot(v_corner, v_corner);
     float edge = max(1.0 - r, 0.0);
     float core = exp(-28.0 * r);
-    float skirt = 0.16 / (1.0 + 22.0 * r) * edge;
-    vec3 white = vec3(max(v_colour.r, max(v_colour.g, v_colour.b)));
-    o_colour = vec4(sqrt(max(mix(v_colour, white, 0.35 * core), 0.0)) * (core + skirt) * edge, 0.0);
+    float skirt = 0.34 / (1.0 + 16.0 * r) * edge;
+        o_colour = vec4(sqrt(max(v_colour, 0.0)) * (core + skirt) * edge, 0.0);
 }

@@ -17,5 +17,6 @@ vec3 hazed(vec3 colour, float distance) {
 // Square root in place of the sRGB curve (textures are squared in turn), with a soft shoulder.
 vec3 film(vec3 light) {
     light = max(light, 0.0);
-    return sqrt(light * (1.0 + 0.12 * light) / (1.0 + 0.42 * light * light));
+    vec3 shown = sqrt(light * (1.0 + 0.12 * light) / (1.0 + 0.42 * light * light));
+    return shown * (0.85 + shown * (0.45 - 0.30 * shown));
 }
