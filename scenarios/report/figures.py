@@ -139,8 +139,8 @@ def _maps(
         "Red-violet speaks for a car, green for background; on the line they are equally likely.",
     )
     note = (
-        f"Densities of image place and image speed, without yaw, at a focal length of {focal:.0f} px{focal_said} and"
-        f" {priors.speed:.1f} m/s{speed_said}. The dots are samples of this run's traces, coloured by"
+        "Densities of image place and image speed, without yaw, at a focal length of"
+        f" {focal:.0f} px{focal_said} and {priors.speed:.1f} m/s{speed_said}. The dots are samples of this run's traces, coloured by"
         + (" what they truly are." if log is not None else " their label.")
     )
     return [
