@@ -34,7 +34,9 @@ def test_signs_of_pitch_and_roll():
 
 
 def test_projection_of_a_known_point_and_behind_the_camera():
-    pixels, depth = project(CAMERA, Pose.looking([0, 0, 0], yaw=np.pi / 2), [[-1.0, 8.0, 0.5], [0.0, -8.0, 0.0]])
+    pixels, depth = project(
+        CAMERA, Pose.looking([0, 0, 0], yaw=np.pi / 2), [[-1.0, 8.0, 0.5], [0.0, -8.0, 0.0]]
+    )
     assert np.allclose(pixels[0], [320 - 100, 240 - 50])
     assert np.allclose(depth, [8.0, -8.0])
     assert np.isnan(pixels[1]).all()

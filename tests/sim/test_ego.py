@@ -22,7 +22,9 @@ def test_resonator_has_unit_deviation_and_stays_in_its_band():
 
 
 def test_resonator_is_stationary_from_the_start():
-    first = [[r.step() for _ in range(3)] for r in (Resonator(2.2, 0.25, 30, stream(i, "t")) for i in range(1500))]
+    first = [
+        [r.step() for _ in range(3)] for r in (Resonator(2.2, 0.25, 30, stream(i, "t")) for i in range(1500))
+    ]
     assert np.std(np.array(first), axis=0) == pytest.approx(1.0, rel=0.1)
 
 
