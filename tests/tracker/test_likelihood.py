@@ -14,7 +14,6 @@ from tracker.in_car.likelihood import (
     LikelihoodTable,
     MotionModel,
     MotionPriors,
-    SpeedTables,
     corridor_density,
     corridor_norm,
     likelihood_table,
@@ -290,19 +289,6 @@ def test_table_is_bounded_outside_its_grid():
     found = table.log_ratio([-1e4, 1e4, 0.0], [1e6, -1e6, np.inf])
     assert np.isfinite(found).all()
     assert np.abs(table.values).max() < 15
-
-
-def test_speed_tables_follow_the_speed():
-    """A point that moves as the road would at 20 m/s is background at 20 m/s, not at 5."""
-    tables = SpeedTables(FOCAL, MotionPriors(speed_sd=1.0), x_max=320.0)
-    x, v = np.array([200.0, 100.0]), np.array([20.0 * 200 / 20, 0.0])
-    at_20 = tables.log_ratio(x, v, 20.0, [4.0, 8.0])
-    assert at_20[0] < -2.5
-    assert at_20[1] > 1.5
-    assert tables.log_ratio(x, v, 5.0, 4.0)[0] > at_20[0] + 1
-    between = tables.log_ratio(x, v, 21.0, 4.0)
-    ends = [tables.log_ratio(x, v, speed, 4.0) for speed in (20.0, 22.0)]
-    np.testing.assert_allclose(between, np.mean(ends, axis=0), rtol=1e-9)
 
 
 def test_bad_focal():

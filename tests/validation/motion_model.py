@@ -6,7 +6,7 @@ object and sampled frame, at the object's centre. Two sides are compared that sh
 - the picture: x is the centre's projection with the scene's own camera poses, v its difference quotient
   between the frames before and after, and the centre counts if the id map shows the object there;
 - the paper: priors of X, Z and the velocities, measured in space over all objects, seen or not, are
-  projected by `tracker.in_car.projection` (eqs. 10, 15, 17), times the visibility measured per cell of (x, Z).
+  projected by `tracker.in_car.projection` (eqs. 10, 15, 17), times the visibility by cell of (x, Z).
 
 The priors match the drives to different degrees. "family" keeps paper 1's own distributions and fits their
 parameters, with eq. (12) cut to what lies beside the asphalt. "measured" takes each one-dimensional prior

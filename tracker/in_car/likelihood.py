@@ -5,7 +5,7 @@ They are not learnt: distributions of places and velocities in space are project
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
@@ -227,7 +227,7 @@ class LikelihoodTable:
         return np.asarray((1 - a) * low + a * high)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=16)
 def likelihood_table(focal: float, priors: MotionPriors, x_max: float) -> LikelihoodTable:
     """Return the table of a model, built once in a process.
 
@@ -237,51 +237,3 @@ def likelihood_table(focal: float, priors: MotionPriors, x_max: float) -> Likeli
         x_max: Px, half the image's width.
     """
     return LikelihoodTable.build(MotionModel(focal, priors), x_max=x_max)
-
-
-class SpeedTables:
-    """Log ratios where the camera's speed is measured anew in each frame.
-
-    There is a table for each of a row of speeds and for each of a few noise levels, built when first needed.
-
-    Args:
-        focal: Px.
-        priors: Of the model; its ``speed`` and ``v_sd`` are replaced by those of each call, its ``speed_sd``
-            is the error of the measured speed, which should not be below a third of ``step``.
-        x_max: Px, half the image's width.
-        step: M/s between tables.
-    """
-
-    def __init__(self, focal: float, priors: MotionPriors, *, x_max: float, step: float = 2.0) -> None:
-        self._focal = focal
-        self._priors = priors
-        self._x_max = x_max
-        self._step = step
-
-    def log_ratio(self, x: ArrayLike, v: ArrayLike, speed: float, v_sd: ArrayLike) -> Floats:
-        """Return ln p(x, v | C) - ln p(x, v | B) at a speed.
-
-        Args:
-            x: (N,) px from the principal point.
-            v: (N,) px/s, the yaw taken out.
-            speed: M/s, >= 0.
-            v_sd: (N,) px/s, standard deviations of v, rounded to powers of 2 between 1 and 64 px/s.
-
-        Returns:
-            (N,) log ratios, linear in speed between tables.
-        """
-        x, v, v_sd = np.broadcast_arrays(np.asarray(x, float), np.asarray(v, float), np.asarray(v_sd, float))
-        levels = np.round(np.log2(np.clip(v_sd, 1.0, 64.0))).astype(int)
-        below = int(max(speed, 0.0) // self._step)
-        part = max(speed, 0.0) / self._step - below
-        result = np.zeros(x.shape)
-        for level in np.unique(levels):
-            chosen = levels == level
-            low, high = (self._table(step, int(level)) for step in (below, below + 1))
-            result[chosen] = (1 - part) * low.log_ratio(x[chosen], v[chosen])
-            result[chosen] += part * high.log_ratio(x[chosen], v[chosen])
-        return result
-
-    def _table(self, step: int, level: int) -> LikelihoodTable:
-        priors = replace(self._priors, speed=step * self._step, v_sd=float(2**level))
-        return likelihood_table(self._focal, priors, self._x_max)
