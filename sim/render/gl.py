@@ -29,7 +29,7 @@ _SHADOW_REACH, _SHADOW_WIDEN = (
     120.0,
     2.5,
 )  # metres, and half-widths of the frame, in which bodies cast shadows
-_BEAM = 300.0
+_BEAM = 130.0
 _GLOSS = {  # share of the body's colour (2: by the texture's alpha), least reflection, by the alpha, retro-reflection
     Surface.PAINT: (1.0, 0.055, 0.02, 0.0),
     Surface.GLASS: (0.0, 0.22, 0.0, 0.0),

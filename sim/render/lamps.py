@@ -159,7 +159,7 @@ def halos(burning: Burning, camera: Camera, *, night: bool) -> NDArray[np.void]:
     )
     out["radius"] = np.maximum(scale * glare * (1.0 if night else 0.3), 1.0)
     fade = np.minimum(1.0, 90.0 / distance[rows]) ** 0.6
-    out["colour"] = burning.colour[rows] * (facing[rows] * fade * (0.9 if night else 0.25))[:, None]
+    out["colour"] = burning.colour[rows] * (facing[rows] * fade * (2.2 if night else 0.25))[:, None]
     return out
 
 

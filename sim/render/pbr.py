@@ -267,7 +267,7 @@ class PbrRenderer:
 def road_picture(stage: Stage) -> NDArray[np.uint8]:
     """Bake one period of the paved band with its marks, (2048, 512, 3) sRGB."""
     baked = road_texture(stage.ground, stage.light.seed).astype(float) / 255
-    grey = 0.165 * baked[..., 0] * (1 - 0.45 * baked[..., 1])
+    grey = 0.26 * baked[..., 0] * (1 - 0.45 * baked[..., 1])
     picture = np.repeat(np.sqrt(grey)[..., None], 3, axis=-1)
     low, high = stage.ground.paved[0] - MARGIN, stage.ground.paved[1] + MARGIN
     d = low + (np.arange(picture.shape[1]) + 0.5) / picture.shape[1] * (high - low)

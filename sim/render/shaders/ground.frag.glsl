@@ -33,7 +33,7 @@ void main() {
     float dash = clamp((1.5 - abs(phase)) / along + 0.5, 0.0, 1.0);
     dash = mix(dash, 0.25, clamp(along / 8.0 - 0.3, 0.0, 1.0));
     painted *= mix(1.0, dash, line.z);
-    float asphalt = 0.165 * worn.r * (0.68 + 0.64 * fine.r) * (0.9 + 0.2 * fine.g);
+    float asphalt = 0.26 * worn.r * (0.68 + 0.64 * fine.r) * (0.9 + 0.2 * fine.g);
     asphalt *= 1.0 - 0.45 * worn.g - 0.35 * fine.b * clamp((broad.a - 0.45) * 4.0, 0.0, 1.0);
     vec3 albedo = mix(asphalt * vec3(0.98, 1.0, 1.05), vec3(0.20, 0.18, 0.15), 0.55 * worn.a);
     float road_mark = painted * clamp(1.35 - 0.9 * worn.b * worn.b - 0.5 * fine.r * worn.b, 0.0, 1.0);
