@@ -59,9 +59,9 @@ def annotate(
             _dashed(picture, box, colour)
         else:
             _rectangle(picture, box, colour, 1)
-    # Dark beneath light: to be read on any sky.
-    cv2.putText(canvas, caption, (8, 18), _FONT, 0.45, (20, 20, 24), 3, cv2.LINE_AA)
-    cv2.putText(canvas, caption, (8, 18), _FONT, 0.45, (240, 240, 245), 1, cv2.LINE_AA)
+    (wide, _), _ = cv2.getTextSize(caption, _FONT, 0.4, 1)
+    cv2.rectangle(canvas, (0, 0), (wide + 11, 17), (22, 22, 22), cv2.FILLED)
+    cv2.putText(canvas, caption, (6, 13), _FONT, 0.4, (235, 238, 242), 1, cv2.LINE_AA)
     return canvas
 
 

@@ -140,8 +140,8 @@ def _maps(
     )
     note = (
         "Densities of image place and image speed, without yaw, at a focal length of"
-        f" {focal:.0f} px{focal_said} and {priors.speed:.1f} m/s{speed_said}. The dots are samples of this run's traces, coloured by"
-        + (" what they truly are." if log is not None else " their label.")
+        f" {focal:.0f} px{focal_said} and {priors.speed:.1f} m/s{speed_said}. The dots are samples of this"
+        " run's traces, coloured by" + (" what they truly are." if log is not None else " their label.")
     )
     return [
         Plot(title=title, caption=caption, svg=svg)
