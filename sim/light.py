@@ -13,8 +13,8 @@ Floats = NDArray[np.float64]
 
 _SUN_HIGH = np.array([1.0, 0.95, 0.87])
 _SUN_LOW = np.array([1.0, 0.84, 0.64])
-_CLEAR_ZENITH = np.array([0.085, 0.20, 0.46])
-_CLEAR_HORIZON = np.array([0.47, 0.61, 0.79])
+_CLEAR_ZENITH = np.array([0.050, 0.14, 0.37])
+_CLEAR_HORIZON = np.array([0.34, 0.47, 0.62])
 _OVERCAST_ZENITH = np.array([0.36, 0.39, 0.44])
 _OVERCAST_HORIZON = np.array([0.60, 0.63, 0.67])
 _RAIN_ZENITH = np.array([0.25, 0.27, 0.30])

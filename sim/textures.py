@@ -185,7 +185,7 @@ def _foliage(rng: np.random.Generator) -> Floats:
     clumps = _fbm(rng, 6, 3, 0.75)
     leaves = _fbm(rng, 32, 3, 0.8)
     light = 0.42 + 0.20 * clumps + 0.22 * leaves
-    colour = _tint((0.035, 0.06, 0.025), (0.42, 0.47, 0.20), light)
+    colour = _tint((0.06, 0.09, 0.04), (0.54, 0.58, 0.29), light)
     yellow = 0.05 * _fbm(rng, 4, 2)
     colour += np.stack([yellow, 0.4 * yellow, np.zeros_like(yellow)], axis=-1)
     colour[(clumps + 0.8 * leaves) < -1.15] = (0.025, 0.035, 0.018)
@@ -202,7 +202,7 @@ def _bark(rng: np.random.Generator) -> Floats:
 def _concrete(rng: np.random.Generator) -> Floats:
     """Paint concrete: stains running down, joints every two metres, grain."""
     row, column = _rows()
-    shade = 0.60 + 0.035 * _fbm(rng, 3, 4) + 0.05 * np.minimum(_fbm(rng, 16, 3, 0.6, stretch=8), 0.3)
+    shade = 0.60 + 0.035 * _fbm(rng, 3, 4) + 0.025 * np.minimum(_fbm(rng, 16, 3, 0.6, stretch=8), 0.3)
     shade += 0.02 * rng.normal(size=shade.shape)
     shade[np.abs((column * 2) % 1 - 0.5) > 0.492] -= 0.22
     shade[np.abs((row * 2) % 1 - 0.5) > 0.494] -= 0.10

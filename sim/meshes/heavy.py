@@ -345,5 +345,5 @@ def _bus(builder: MeshBuilder, size: tuple[float, float, float], detail: int) ->
         for side in (1.0, -1.0):
             y = sorted((side * half, side * (half + 0.25)))
             builder.box(
-                (front - 0.05, y[0], height - 1.2), (front + 0.1, y[1], height - 0.6), Surface.PLASTIC
+                (front - 0.14, y[0], height - 1.2), (front - 0.0, y[1], height - 0.6), Surface.PLASTIC
             )

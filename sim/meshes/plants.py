@@ -174,27 +174,26 @@ def _broadleaf(name: str, size: tuple[float, float, float], clumps: int, low: fl
 
 
 def _conifer(name: str, size: tuple[float, float, float], detail: int) -> Mesh:
-    rng = stream(_SEED, "plants", name)
+    """Make a conifer: flat lumps stacked to a cone."""
     builder = MeshBuilder()
     width, height = size[0], size[2]
-    builder.prism((0, 0, 0), (0, 0, 0.3 * height), (0.02 * height, 0.015 * height), Surface.BARK, sides=4)
-    tiers, sides = {2: (6, 9), 1: (4, 7), 0: (1, 5)}[detail]
+    builder.prism(
+        (0, 0, 0), (0, 0, 0.3 * height), (0.02 * height, 0.015 * height), Surface.BARK, sides=3 + (detail > 0)
+    )
+    tiers = (2, 4, 7)[detail]
+    blobs = []
     for i in range(tiers):
-        low = height * (0.10 + 0.82 * i / tiers)
-        high = min(height, low + height * (0.9 / tiers) * 1.55) if tiers > 1 else height
-        reach = width / 2 * (1 - 0.85 * i / max(tiers, 1)) ** 0.9
-        turn = 2 * np.pi * np.arange(sides) / sides + rng.uniform(0, 1)
-        jag = reach * rng.uniform(0.70, 1.0, sides)
-        drop = low + rng.uniform(-0.03, 0.02, sides) * height
-        ring = np.stack([jag * np.cos(turn), jag * np.sin(turn), drop], axis=1)
-        tip = np.array([0, 0, high])
-        for j in range(sides):
-            corner = np.stack([ring[j], ring[(j + 1) % sides], tip])
-            out = corner.mean(axis=0) - (0, 0, low)
-            normal = out / np.linalg.norm(out) + rng.normal(0, 0.25, (3, 3))
-            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-            builder.polygon(corner, Surface.FOLIAGE, facing=out, normals=normal)
-        builder.polygon(ring, Surface.FOLIAGE, facing=(0, 0, -1))
+        up = (i + 0.5) / tiers
+        reach = 0.5 * width * (1.04 - up) ** 0.85
+        blobs.append(
+            (
+                np.array([0.0, 0.0, height * (0.12 + 0.84 * up)]),
+                np.array([reach, reach, 0.75 * height / tiers]),
+            )
+        )
+    leaves = (10, 44, 190)[detail]
+    rng = stream(_SEED, "plants", name, "leaves")
+    crown(builder, blobs, rng, leaves=leaves, leaf=(0.24, 0.17, 0.12)[detail] * width)
     return scaled_to(builder, size)
 
 

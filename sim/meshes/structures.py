@@ -199,6 +199,8 @@ def _woods(letter: str) -> tuple[Mesh, Mesh]:
                 (side * 1.5 * depth, tops),
             ]
             rows += [(flat, 0.8 * tops)]
+            if columns < 4:
+                del rows[1]
             lattice = np.stack([np.stack([x, y, z], axis=1) for y, z in rows])
             fluff = rng.normal(0, 0.45, lattice.shape) + np.array([0.0, 0.8 * side, 0.45])
             fluff /= np.linalg.norm(fluff, axis=2, keepdims=True)
@@ -223,15 +225,11 @@ def _hill(letter: str) -> Mesh:
     builder = MeshBuilder()
     count = 33
     x = np.linspace(-450, 450, count)
-    crest = 20 * np.sqrt(np.clip(1 - (x / 455) ** 2, 0, 1))
-    for octave in range(1, 6):
-        crest += (
-            16
-            / octave
-            * np.sin(x / 900 * 2 * np.pi * octave + rng.uniform(0, 2 * np.pi))
-            * np.clip(1 - (x / 450) ** 2, 0, 1)
-        )
-    crest = np.clip(crest + 8, 0.0, None) * np.clip(1 - (x / 450) ** 4, 0, 1)
+    envelope = np.clip(1 - (x / 450) ** 2, 0, 1)
+    crest = 26 * np.sqrt(envelope)
+    for octave in (1, 2, 3, 5, 8, 13):
+        crest += 15 / octave * np.sin(x / 900 * 2 * np.pi * octave + rng.uniform(0, 2 * np.pi)) * envelope
+    crest = np.clip(crest + 4, 0.0, None) * np.clip(1 - (x / 450) ** 4, 0, 1)
     rows = []
     for y, share in ((-130, 0.0), (-70, 0.55), (0, 1.0), (70, 0.55), (130, 0.0)):
         wobble = rng.uniform(0.8, 1.2, count) if share < 1 else 1.0

@@ -5,69 +5,62 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.roads import LEAD_IN
 from sim.scenery.yard import Yard
 
 Floats = NDArray[np.float64]
 
 
 def place_horizon(yard: Yard) -> None:
-    """Place woods from 65 to 260 m and hills from 450 to 1000 m beside and beyond the road."""
+    """Place woods and hills beside and beyond the road, outside the reach of eq. (12)."""
     road = yard.road
-    rng = yard.stream("woods")
+    low, high = road.paved
+    for rank, (nearest, spread, share) in enumerate(((58.0, 30.0, 0.55), (110.0, 130.0, 0.85))):
+        for side, edge in ((-1.0, low), (1.0, high)):
+            rng = yard.stream("woods", rank, int(side))
+            for s in np.arange(-40.0, road.length + 900, 112.0):
+                roll = rng.random(7)
+                if roll[0] > share:
+                    continue
+                size = yard.size("woods-a") * (0.85 + 0.5 * roll[1], 1.0, 0.55 + 0.6 * roll[2])
+                name, turn = f"woods-{'abc'[int(roll[3] * 3)]}", 0.3 * (roll[4] - 0.5)
+                _far(
+                    yard, name, s + 60 * roll[5], edge + side * (nearest + spread * roll[6]), turn, size, 30.0
+                )
     for side in (-1.0, 1.0):
-        for s in np.arange(-40.0, road.length + 900, 110.0):
+        rng = yard.stream("hills", int(side))
+        for s in np.arange(0.0, road.length + 1600, 420.0):
             roll = rng.random(6)
-            d = side * (65 + 195 * roll[0] ** 1.5)
-            if roll[1] > 0.75:
-                continue
-            size = yard.size("woods-a") * (0.8 + 0.5 * roll[2], 1.0, 0.7 + 0.6 * roll[3])
-            _far(
-                yard,
-                f"woods-{'abc'[int(roll[4] * 3)]}",
-                s + 60 * roll[5],
-                d,
-                0.25 * (roll[5] - 0.5),
-                size,
-                45.0,
-            )
-    rng = yard.stream("hills")
-    for side in (-1.0, 1.0):
-        for s in np.arange(0.0, road.length + 2000, 520.0):
-            roll = rng.random(6)
-            size = yard.size("hill-a") * (0.8 + 0.6 * roll[0], 1.0, 0.5 + 0.9 * roll[1])
-            d = side * (450 + 550 * roll[2])
+            size = yard.size("hill-a") * (0.7 + 0.6 * roll[0], 1.0, 0.45 + 0.9 * roll[1])
+            d = side * (300 + 450 * roll[2])
             _far(
                 yard,
                 f"hill-{'abc'[int(roll[3] * 3)]}",
                 s + 300 * roll[4],
                 d,
-                0.5 * (roll[5] - 0.5),
+                0.4 * (roll[5] - 0.5),
                 size,
-                300.0,
+                60.0,
             )
+    rng = yard.stream("hills", "ahead")
     for i in range(3):
         roll = rng.random(3)
         size = yard.size("hill-a") * (1.2, 1.0, 0.5 + 0.6 * roll[0])
-        _far(
-            yard,
-            f"hill-{'abc'[i]}",
-            road.length + 900 + 250 * i,
-            400 * (roll[1] - 0.5),
-            np.pi / 2 + 0.3 * (roll[2] - 0.5),
-            size,
-            0.0,
-        )
+        turn = np.pi / 2 + 0.3 * (roll[2] - 0.5)
+        _far(yard, f"hill-{'abc'[i]}", road.length + 700 + 250 * i, 400 * (roll[1] - 0.5), turn, size, 60.0)
 
 
 def _far(yard: Yard, name: str, s: float, d: float, turn: float, size: Floats, keep: float) -> None:
-    """Place a far thing, unless a bend brings the asphalt within ``keep`` metres of its middle."""
+    """Place a far thing, unless any stretch of the road runs within ``keep`` metres of its footprint."""
     end = yard.road.length
     on = min(s, end)
     x, y = (float(a) for a in yard.road.to_world(on, d))
     heading = float(yard.road.heading(on))
     x, y = x + (s - on) * np.cos(heading), y + (s - on) * np.sin(heading)
-    along = np.linspace(0, end, max(2, int(end / 25)))
-    xs, ys = yard.road.to_world(along, 0.0)
-    if float(np.hypot(xs - x, ys - y).min()) < keep:
+    yaw = heading + turn
+    xs, ys = yard.road.to_world(np.arange(-LEAD_IN, end + 10.0, 10.0), 0.0)
+    along = (xs - x) * np.cos(yaw) + (ys - y) * np.sin(yaw)
+    aside = (ys - y) * np.cos(yaw) - (xs - x) * np.sin(yaw)
+    if ((np.abs(along) < size[0] / 2 + keep) & (np.abs(aside) < size[1] / 2 + keep)).any():
         return
-    yard.add_at(name, x, y, heading + turn, size)
+    yard.add_at(name, x, y, yaw, size)

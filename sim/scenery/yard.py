@@ -32,7 +32,7 @@ class Yard:
         self.index = {model.name: i for i, model in enumerate(catalogue)}
         self._rows: list[tuple[int, float, float, float, Floats, Floats]] = []
 
-    def stream(self, *names: str) -> np.random.Generator:
+    def stream(self, *names: str | int) -> np.random.Generator:
         """Return the stream of one purpose."""
         return stream(self.seed, "scenery", *names)
 

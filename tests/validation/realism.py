@@ -1,0 +1,200 @@
+"""Does the simulator look like a camera to a detector? Low-level features of scenarios beside those of recordings.
+
+``python -m tests.validation.realism`` prints medians and quartiles of what the in-car tracker's detector finds in one
+frame, and whether each median of the scenario lies within a factor of two of the recordings'. ``--sheet FILE.png``
+writes frames of both, one above the other; ``--frames N`` says how many frames to take of each side.
+
+All frames are brought to 640 x 360: recordings are resized, of the scenario's 640 x 480 the middle rows are taken.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from scenarios.spec import load
+from scenarios.video import Video
+from sim.render.gl import GlRenderer
+from sim.scenes.in_car import InCarScene
+from sim.sensor import Sensor
+from tracker.in_car import segments
+from tracker.in_car.features import corner_response, find_corners, find_lamps, working_picture
+
+RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "real" / "in-car"
+PAIRS = (
+    (("solidWhiteRight.mp4", "test_video.mp4", "empty_desert_road.mp4"), ("in-car-day", "in-car-curve")),
+    (("night_motorway.mp4",), ("in-car-night",)),
+)
+WIDTH, HEIGHT = 640, 360
+CORNER_CELL, CORNER_LEAST = 16, 4e-4
+"""A corner is the strongest of its cell, px, if its response reaches this."""
+SETTLE = 30
+"""Ticks between the frames that are taken of a scenario."""
+
+Image = NDArray[np.uint8]
+Grey = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """One number a frame; several where a frame has several, such as lengths."""
+
+    name: str
+    unit: str
+    take: Callable[[Grey], NDArray[np.float64]]
+    factor: bool = True
+
+
+def lines(grey: Grey) -> NDArray[np.float64]:
+    """Horizontal line segments: (M, 6)."""
+    derivative = segments.vertical_derivative(grey)
+    return segments.find_segments(derivative, segments.edge_threshold(derivative))
+
+
+def line_count(grey: Grey) -> NDArray[np.float64]:
+    return np.array([float(len(lines(grey)))])
+
+
+def line_lengths(grey: Grey) -> NDArray[np.float64]:
+    found = lines(grey)
+    return found[:, segments.X1] - found[:, segments.X0]
+
+
+def long_lines(grey: Grey) -> NDArray[np.float64]:
+    return np.array([float((line_lengths(grey) >= 24).sum())])
+
+
+def corners(grey: Grey) -> NDArray[np.float64]:
+    free = np.zeros_like(grey)
+    return np.array([float(len(find_corners(corner_response(grey), free, CORNER_CELL, CORNER_LEAST, 4000)))])
+
+
+def peaks(grey: Grey) -> NDArray[np.float64]:
+    night = float(np.clip(2.0 - 2.0 * grey.mean() / 80.0, 0.0, 1.0))
+    return np.array([float(len(find_lamps(grey, night)))])
+
+
+def spectrum_slope(grey: Grey) -> NDArray[np.float64]:
+    """Slope of log power over log frequency, mean over all directions, between 4 and 80 periods a height."""
+    window = np.outer(np.hanning(grey.shape[0]), np.hanning(grey.shape[1]))
+    power = np.abs(np.fft.fft2((grey - grey.mean()) * window)) ** 2
+    radius = np.hypot(np.fft.fftfreq(grey.shape[0])[:, None], np.fft.fftfreq(grey.shape[1]))
+    edges = np.geomspace(4 / HEIGHT, 80 / HEIGHT, 16)
+    ring = np.digitize(radius, edges)
+    level = [np.log(power[ring == i].mean()) for i in range(1, len(edges))]
+    return np.array([np.polyfit(np.log(np.sqrt(edges[1:] * edges[:-1])), level, 1)[0]])
+
+
+def noise(grey: Grey) -> NDArray[np.float64]:
+    """Robust standard deviation of the noise, grey levels: the calmest 80 % of the finest diagonal wavelet."""
+    block = grey[: HEIGHT // 2 * 2, : WIDTH // 2 * 2].astype(float)
+    detail = np.sort(
+        np.abs(block[::2, ::2] - block[::2, 1::2] - block[1::2, ::2] + block[1::2, 1::2]).ravel() / 2
+    )
+    # The root mean square of a standard normal's smallest 80 % by magnitude is 0.6615.
+    return np.array([np.sqrt(np.mean(detail[: int(0.8 * len(detail))] ** 2)) / 0.6615])
+
+
+def brightness(grey: Grey) -> NDArray[np.float64]:
+    return np.array([grey.mean()])
+
+
+def contrast(grey: Grey) -> NDArray[np.float64]:
+    return np.array([grey.std()])
+
+
+MEASURES = (
+    Measure("horizontal segments", "a frame", line_count),
+    Measure("  of 24 px or more", "a frame", long_lines),
+    Measure("  their length", "px", line_lengths),
+    Measure("corners", "a frame", corners),
+    Measure("lamp peaks", "a frame", peaks),
+    Measure("spectral slope", "", spectrum_slope),
+    Measure("noise", "grey levels", noise),
+    Measure("mean brightness", "grey levels", brightness),
+    Measure("contrast", "grey levels", contrast),
+)
+
+
+def recorded(path: Path, count: int) -> Iterator[Image]:
+    """Yield ``count`` frames spread over a recording, 640 x 360."""
+    with Video(path) as video:
+        frames = [frame.image for frame in video.frames()]
+    for i in np.linspace(0, len(frames) - 1, min(count, len(frames))).astype(int):
+        yield np.asarray(cv2.resize(frames[i], (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def simulated(name: str, count: int, seeds: int = 6) -> Iterator[Image]:
+    """Yield about ``count`` frames of a scenario, spread over several seeds, 640 x 360."""
+    spec = load(name)
+    each = max(1, count // seeds)
+    for seed in range(seeds):
+        scene = InCarScene(spec.in_car, seed=seed, rate=spec.rate, seconds=(each * SETTLE + 1) / spec.rate)
+        sensor = Sensor(spec.in_car.sensor, scene.stage.light, scene.camera, spec.rate, seed)
+        with GlRenderer(scene.stage, scene.camera) as renderer:
+            for tick in range(each * SETTLE):
+                state = scene.step()
+                if tick % SETTLE:
+                    continue
+                picture = renderer.render(state, scene.camera, scene.pose(state))
+                image = sensor.expose(picture, tick, state.ego.speed if state.ego else 0.0)
+                top = (image.shape[0] - HEIGHT) // 2
+                yield image[top : top + HEIGHT]
+
+
+def compare(real: list[Image], synthetic: list[Image]) -> list[str]:
+    """Return one printed line a measure."""
+    rows = []
+    greys = [[working_picture(image).grey for image in images] for images in (real, synthetic)]
+    for measure in MEASURES:
+        columns, medians = [], []
+        for side in greys:
+            values = np.concatenate([measure.take(grey) for grey in side])
+            low, middle, high = np.percentile(values, (25, 50, 75)) if len(values) else (0.0, 0.0, 0.0)
+            columns.append(f"{low:8.1f} {middle:8.1f} {high:8.1f}")
+            medians.append(abs(float(middle)))
+        ratio = medians[1] / medians[0] if medians[0] else (1.0 if medians[1] == 0 else np.inf)
+        verdict = "yes" if 0.5 <= ratio <= 2.0 else "NO"
+        rows.append(
+            f"{measure.name:22s} {measure.unit:12s} {columns[0]}   {columns[1]}   {ratio:6.2f}  {verdict}"
+        )
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--frames", type=int, default=60, help="of each side")
+    parser.add_argument("--sheet", type=Path, help="where to write a contact sheet")
+    options = parser.parse_args()
+    sheet = []
+    for clips, scenarios in PAIRS:
+        missing = [clip for clip in clips if not (RECORDINGS / clip).is_file()]
+        if missing:
+            print(f"left out, no such recording: {', '.join(missing)}")
+            continue
+        share = max(1, options.frames // len(clips))
+        real = [image for clip in clips for image in recorded(RECORDINGS / clip, share)]
+        for name in scenarios:
+            synthetic = list(simulated(name, options.frames))
+            print(f"\n{name} ({len(synthetic)} frames) against {', '.join(clips)} ({len(real)} frames)")
+            print(f"{'':36s} {'recorded: 25 %, median, 75 %':26s}   {'simulated':26s}    ratio  within 2")
+            print("\n".join(compare(real, synthetic)))
+            for images in (real, synthetic):
+                chosen = [images[i] for i in np.linspace(0, len(images) - 1, 6).astype(int)]
+                sheet.append(
+                    np.concatenate([cv2.resize(image, (WIDTH // 2, HEIGHT // 2)) for image in chosen], axis=1)
+                )
+    if options.sheet and sheet:
+        cv2.imwrite(str(options.sheet), np.concatenate(sheet)[..., ::-1])
+
+
+if __name__ == "__main__":
+    main()
