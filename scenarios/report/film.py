@@ -40,7 +40,7 @@ class Film:
         stream.width, stream.height = width + width % 2, height + height % 2
         stream.pix_fmt = "yuv420p"
         # As many threads on any machine: the coding depends on their number.
-        stream.options = {"crf": str(CRF), "preset": "veryfast", "threads": "2"}
+        stream.options = {"crf": str(CRF), "preset": "superfast", "threads": "2"}
         self._stream = stream
         self._tick = 1 / frequency
         self._open = True
