@@ -16,8 +16,6 @@ Floats32 = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
 _TILE = 1024
-_SHARED = 0.8
-"""Share of the noise's amplitude that all three colours have in common: coders and denoisers thin out the rest."""
 
 _DAY_LEVEL, _NIGHT_LEVEL = 112.0, 40.0
 _DAY_GAIN, _NIGHT_GAIN = (0.72, 1.35), (0.8, 1.25)
@@ -38,6 +36,7 @@ def _develop(
     out: NDArray[np.uint8],
 ) -> None:
     """Exposure, vignetting and noise in one walk over the pixels."""
+    # Most of the noise is common to all three colours: coders and denoisers thin out the rest.
     shared, own = np.float32(0.8), np.float32(0.6)
     for i in range(image.shape[0]):
         for j in range(image.shape[1]):
@@ -55,7 +54,7 @@ def _develop(
 def _refract(
     image: NDArray[np.uint8], soft: NDArray[np.uint8], places: NDArray[np.float64], radii: NDArray[np.float64]
 ) -> None:
-    """Put drops on the windscreen: each shows ``soft``, an eighth of the scene's size, around its own place."""
+    """Put drops on the windscreen: each shows ``soft``, the scene at an eighth of its size."""
     rows, columns = image.shape[:2]
     for drop in range(radii.size):
         x, y, radius = places[drop, 0], places[drop, 1], radii[drop]
@@ -77,8 +76,8 @@ def _refract(
 class Sensor:
     """Turns rendered pictures into recorded frames.
 
-    The exposure follows the pictures, so frames are to be given in order; noise and rain depend on the seed and the
-    tick alone.
+    The exposure follows the pictures, so frames are to be given in order; noise and rain depend on the seed
+    and the tick alone.
 
     Args:
         params: Noise, blur, vignetting, lag of the exposure, compression.
@@ -206,7 +205,7 @@ class Sensor:
 
 
 def falloff(camera: Camera, loss: float) -> Floats32:
-    """Return (H, W) factors on coded values: cos^4-like loss of light, ``loss`` of it gone in the farthest corner."""
+    """Return (H, W) factors on coded values: light is lost as by cos^4, ``loss`` of it in the corners."""
     x = (np.arange(camera.width) + 0.5 - camera.width / 2)[None, :]
     y = (np.arange(camera.height) + 0.5 - camera.height / 2)[:, None]
     radius = (x * x + y * y) / (camera.width**2 + camera.height**2) * 4
@@ -230,8 +229,8 @@ def noise_tile(seed: int, camera: Camera) -> Floats32:
 def noise_amplitude(noise: float) -> Floats32:
     """Return the noise's standard deviation for each of 256 coded values.
 
-    Photon noise has a variance that grows with the light; coding by the square root makes it even, so what is left is
-    the reader's noise in the dark, and less of all near white where the curve is flat.
+    Photon noise has a variance that grows with the light; coding by the square root makes it even, so what
+    is left is the reader's noise in the dark, and less of all near white where the curve is flat.
 
     Args:
         noise: Standard deviation at mid grey.
@@ -242,7 +241,7 @@ def noise_amplitude(noise: float) -> Floats32:
         * np.clip(1.25 - 0.6 * value, 0.4, 1.0)
         * np.clip(0.15 + 3 * value, 0, 1)
     )
-    return (noise * curve / curve[128]).astype(np.float32)
+    return np.asarray(noise * curve / curve[128], np.float32)
 
 
 def _glare(image: Image) -> Image:

@@ -1,8 +1,8 @@
 """Smooths the stairs along edges of a picture that has one sample a pixel.
 
-Software OpenGL pays for four samples a pixel with twice the time of the whole frame; stairs are few pixels, and found
-by their contrast. The method follows T. Lottes, FXAA (NVIDIA, 2009): walk along an edge to both its ends, and shift the
-picture across it by how far the true edge must lie off the pixel's middle.
+Software OpenGL pays for four samples a pixel with twice the time of the whole frame; stairs are few pixels,
+and found by their contrast. The method follows T. Lottes, FXAA (NVIDIA, 2009): walk along an edge to both
+its ends, and shift the picture across it by how far the true edge must lie off the pixel's middle.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _RELATIVE_CONTRAST = 0.12
 _LONGEST = 14
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _smooth(
     image: NDArray[np.uint8],
     luma: NDArray[np.uint8],
@@ -63,13 +63,14 @@ def _smooth(
             ends[k] = end
         nearer = 0 if reach[0] < reach[1] else 1
         shift = 0.0
-        # Only the side on which the edge bends away from this pixel lies on the wrong side of the true edge.
-        if (ends[nearer] < 0) != (m < middle):
+        # Only the side on which the edge bends away from this pixel lies on the wrong side of the true edge,
+        # and an edge without an end in reach is level.
+        if abs(ends[nearer]) >= 0.25 * step and (ends[nearer] < 0) != (m < middle):
             shift = 0.5 - (reach[nearer] - 0.5) / max(reach[0] + reach[1] - 1, 1)
+        # What differs from all around is thinner than a pixel; straight edges stay below a third.
         around = (2 * (n + s + w + e) + nw + ne + sw + se) / 12.0
-        lone = min(abs(around - m) / contrast, 1.0)
-        lone = lone * lone * (3 - 2 * lone)
-        shift = min(max(shift, 0.6 * lone * lone), 0.5)
+        lone = min(max(abs(around - m) / contrast - 0.35, 0.0) / 0.65, 1.0)
+        shift = min(max(shift, 0.6 * lone), 0.5)
         for c in range(3):
             out[i, j, c] = np.uint8(image[i, j, c] + shift * (float(image[oi, oj, c]) - image[i, j, c]) + 0.5)
 

@@ -26,9 +26,9 @@ class RenderError(RuntimeError):
 def context() -> Any:
     """Return the process's moderngl context, made at the first call.
 
-    There is one for all renderers, and it is never given back: ending a context ends EGL for whoever else uses it in
-    the process. Use it inside ``with context() as ctx:`` only, since another library may hold the thread's current
-    context, and call `check` before leaving.
+    There is one for all renderers, and it is never given back: ending a context ends EGL for whoever else
+    uses it in the process. Use it inside ``with context() as ctx:`` only, since another library may hold the
+    thread's current context, and call `check` before leaving.
 
     Raises:
         RenderUnavailableError: If there is no EGL, or no OpenGL 4.3 behind it.
@@ -36,7 +36,8 @@ def context() -> Any:
     try:
         import moderngl
 
-        return moderngl.create_context(standalone=True, backend="egl", require=430)
+        options: dict[str, Any] = {"standalone": True, "backend": "egl", "require": 430}
+        return moderngl.create_context(**options)
     except Exception as error:  # moderngl raises bare Exception, glcontext several kinds of its own
         raise RenderUnavailableError(str(error).splitlines()[0] if str(error) else repr(error)) from error
 

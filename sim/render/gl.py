@@ -25,12 +25,11 @@ from sim.world import Bodies, WorldState
 
 _ROOM = 8192  # instances and draws in a frame
 
-_SHADOW_REACH, _SHADOW_WIDEN = (
-    120.0,
-    2.5,
-)  # metres, and half-widths of the frame, in which bodies cast shadows
+_SHADOW_REACH = 120.0  # metres within which bodies cast shadows
+_SHADOW_WIDEN = 2.5  # half-widths of the frame within which they do
 _BEAM = 130.0
-_GLOSS = {  # share of the body's colour (2: by the texture's alpha), least reflection, by the alpha, retro-reflection
+# Share of the body's colour (2: by the texture's alpha), least reflection, more by the alpha, retro-reflection.
+_GLOSS = {
     Surface.PAINT: (1.0, 0.055, 0.02, 0.0),
     Surface.GLASS: (0.0, 0.22, 0.0, 0.0),
     Surface.CHROME: (0.0, 0.45, 0.0, 0.0),
@@ -48,9 +47,9 @@ _GLOSS = {  # share of the body's colour (2: by the texture's alpha), least refl
 class GlRenderer:
     """Draws the world of one stage.
 
-    A frame is one pass over the geometry, with one sample at each pixel's centre, that writes colour, identity and
-    depth. Shadows are a mask that only the ground's colour reads, the sky and the glare of lamps are colour alone, and
-    the stairs along edges are smoothed afterwards.
+    A frame is one pass over the geometry, with one sample at each pixel's centre, that writes colour,
+    identity and depth. Shadows are a mask that only the ground's colour reads, the sky and the glare of
+    lamps are colour alone, and the stairs along edges are smoothed afterwards.
 
     Args:
         stage: What stands still.
@@ -86,7 +85,8 @@ class GlRenderer:
     def close(self) -> None:
         """Give the graphics memory back. A second call does nothing."""
         with context() as ctx:
-            # moderngl comes back to the framebuffer that was last in use: it must not be one of those that end here.
+            # moderngl comes back to the framebuffer that was last in use: it must not be one of those that
+            # end here.
             ctx.detect_framebuffer(0).use()
             while self._things:
                 self._things.pop().release()
@@ -230,7 +230,9 @@ class GlRenderer:
     def silhouettes(self, state: WorldState, camera: Camera, pose: Pose) -> Silhouettes:
         """Draw each vehicle alone, as the identity pass draws it."""
         with context() as ctx:
-            found = self._silhouettes.draw(ctx, self._alone, self._library, state.vehicles, camera, pose)
+            found: Silhouettes = self._silhouettes.draw(
+                ctx, self._alone, self._library, state.vehicles, camera, pose
+            )
             check(ctx, "drawing silhouettes")
         return found
 

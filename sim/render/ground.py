@@ -19,7 +19,7 @@ MARGIN = 4.0
 """Metres beyond the paved band that the baked texture of the road covers."""
 
 STRETCH = np.dtype([("offset", "<f4", 3), ("arc", "<f4")])
-"""One stretch, as the shader reads it: its origin relative to the camera, and what to add to its arc lengths."""
+"""One stretch, as the shader reads it: its origin relative to the camera, what to add to its arc lengths."""
 
 _STRETCH_LENGTH = 128.0
 _HALF_LINE = 0.075
@@ -28,10 +28,11 @@ _ACROSS, _ALONG = 512, 2048
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stretches:
-    """The ground's faces in stretches of road, each with its own origin so that float32 stays exact to 0.1 mm.
+    """The ground's faces in stretches of road, each with an origin of its own, for float32's sake.
 
     Attributes:
-        vertices: (V, 5) float32: position relative to the stretch's origin, arc length relative to it, offset d.
+        vertices: (V, 5) float32: position relative to the stretch's origin, arc length relative to it,
+            offset d.
         faces: (F, 3) int32, counted from each stretch's ``base_vertex``.
         first: (C,) first index.
         count: (C,) indices.
@@ -148,7 +149,7 @@ def fractal(
 
 
 def grain_texture(seed: int) -> NDArray[np.uint8]:
-    """Make the fine texture of the ground, (512, 512, 4), repeating: stones, mottle, cracks, large-scale noise."""
+    """Make the fine texture of the ground, (512, 512, 4), repeating: stones, mottle, cracks, broad noise."""
     rng = stream(seed, "ground", "grain")
     shape = (512, 512)
     stones = 0.75 * fractal(rng, shape, 0.15) + 0.6 * fractal(rng, shape, 0.8, lowest=8)
@@ -168,8 +169,9 @@ def road_texture(ground: Ground, seed: int) -> NDArray[np.uint8]:
         seed: Of patches, seams and stains.
 
     Returns:
-        (2048, 512, 4) uint8, rows along the road over `PERIOD`, columns from the lowest to the highest d with `MARGIN`
-        on both sides: albedo (0.5 is that of plain asphalt), tar and cracks, wear of the marks, dust.
+        (2048, 512, 4) uint8, rows along the road over `PERIOD`, columns from the lowest to the highest d
+        with `MARGIN` on both sides: albedo (0.5 is that of plain asphalt), tar and cracks, wear of the
+        marks, dust.
     """
     rng = stream(seed, "ground", "road")
     low, high = ground.paved[0] - MARGIN, ground.paved[1] + MARGIN
@@ -231,8 +233,8 @@ def mark_table(ground: Ground) -> NDArray[np.float32]:
         ground: Its lines.
 
     Returns:
-        (1, 2048, 4) float32 over the paved band with `MARGIN`: offset of the line's middle, its half width (0 where
-        there is none at all), 1 if dashed, 1 if yellow.
+        (1, 2048, 4) float32 over the paved band with `MARGIN`: offset of the line's middle, its half width
+        (0 where there is none at all), 1 if dashed, 1 if yellow.
     """
     lines = []
     for edge, style in zip(ground.lane_edges.tolist(), ground.line_styles.tolist(), strict=True):

@@ -21,7 +21,7 @@ INSTANCE = np.dtype(
         ("id", "<u4"),
     ]
 )
-"""One instance, as the shaders read it. Positions are relative because float32 has millimetres left at 15 km."""
+"""One instance, as the shaders read it. Positions are relative: far from the origin float32 is coarse."""
 
 COMMAND = np.dtype(
     [
@@ -169,7 +169,7 @@ class Library:
         return out
 
     def corners(self, bodies: Bodies, selection: Selection) -> NDArray[np.float64]:
-        """Return (M, 8, 3) world metres: corners of the boxes around the selected bodies, as they are turned."""
+        """Return (M, 8, 3) world metres: corners of the boxes around the selected bodies."""
         chosen = bodies.take(selection.rows)
         bounds = self._bounds[chosen.models] * (chosen.sizes / self.sizes[chosen.models])[:, None, :]
         picks = np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)])

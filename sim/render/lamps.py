@@ -97,7 +97,7 @@ class LampPlan:
             elif lamps & Lamps.TAIL:
                 shown.append((self._tail[model], -forward, _TAIL, 1.0, 4.0))
             if lamps & Lamps.HEAD:
-                shown.append((self._head[model], forward + [0.0, 0.0, -0.05], _HEAD, 28.0, 60.0))
+                shown.append((self._head[model], np.array([cos, sin, -0.05]), _HEAD, 28.0, 60.0))
             if streets:
                 shown.append((self._street[model], np.array([0.0, 0.0, -1.0]), _STREET, 2.0, 90.0))
             for places, aim, tint, sharpness, reach in shown:
@@ -173,4 +173,5 @@ def _centres(model: Model, surface: Surface) -> NDArray[np.float64]:
     if surface is Surface.STREET_LAMP:
         return points.mean(axis=0, keepdims=True) if len(points) else points
     sides = [points[points[:, 1] > 0.02], points[points[:, 1] < -0.02]]
-    return np.array([side.mean(axis=0) for side in sides if len(side)]).reshape(-1, 3)
+    middles = [side.mean(axis=0) for side in sides if len(side)]
+    return np.asarray(middles, np.float64).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The same world through pyrender: physically based materials, and an independent oracle of identity and depth."""
+"""The same world through pyrender: physically based materials, an oracle of identity and depth."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def _offscreen() -> Any:
 class PbrRenderer:
     """Draws the world of one stage through pyrender.
 
-    Bodies are nodes that stay while they are drawn. All stands around an origin that follows the camera in steps, since
-    pyrender computes in float32.
+    Bodies are nodes that stay while they are drawn. All stands around an origin that follows the camera in
+    steps, since pyrender computes in float32.
 
     Args:
         stage: What stands still.
@@ -276,7 +276,7 @@ def road_picture(stage: Stage) -> NDArray[np.uint8]:
         if style:
             on = (s % 12.0 < 3.0) if style == 2 else np.ones(len(s), bool)
             picture[np.ix_(on, np.abs(d - edge) < 0.075)] = (0.79, 0.63, 0.28) if style in (3, 4) else 0.79
-    return (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)
+    return np.asarray(np.clip(picture, 0, 1) * 255 + 0.5, np.uint8)
 
 
 def code_colour(code: int) -> tuple[int, int, int]:

@@ -1,8 +1,9 @@
 """Each vehicle drawn alone: how many pixels it would show if nothing stood before it.
 
-Vehicles whose boxes in the image do not overlap share one drawing; each of them is then counted within its own box.
-Inside the frame the drawing goes through the same viewport and matrix as the picture's identities, so that the
-rasteriser covers exactly the same pixels; what lies outside the frame comes from a target three times as wide and high.
+Vehicles whose boxes in the image do not overlap share one drawing; each of them is then counted within its
+own box. Inside the frame the drawing goes through the same viewport and matrix as the picture's identities,
+so that the rasteriser covers exactly the same pixels; what lies outside the frame comes from a target three
+times as wide and high.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def image_boxes(library: Library, bodies: Bodies, selection: Selection, camera: 
     box = np.stack([x.min(1) - 1, y.min(1) - 1, x.max(1) + 2, y.max(1) + 2], axis=1)
     box[cut] = -width, -height, 2 * width, 2 * height
     low, high = np.array([-width, -height] * 2), np.array([2 * width, 2 * height] * 2)
-    return np.floor(np.clip(box, low, high)).astype(np.int64)
+    return np.asarray(np.floor(np.clip(box, low, high)), np.int64)
 
 
 def layered(boxes: Ints, rows: NDArray[np.intp]) -> list[Drawing]:
@@ -171,7 +172,7 @@ class SilhouettePass:
 def _commands(
     library: Library, meshes: NDArray[np.int32], drawings: list[NDArray[np.intp]]
 ) -> tuple[NDArray[np.void], list[tuple[int, int]]]:
-    """Return the commands of all drawings, instances counted through, and where each drawing's begin and how many."""
+    """Return the commands of all drawings, and of each drawing the first and how many."""
     parts, spans, base, first = [], [], 0, 0
     for rows in drawings:
         part = library.commands(meshes[rows])

@@ -10,9 +10,10 @@ from sim.camera import Camera, Pose
 
 
 def view_matrices(camera: Camera, pose: Pose) -> dict[str, Any]:
-    """Return the uniforms of a view: ``u_clip`` from camera-relative world metres to clip space, and ``u_forward``.
+    """Return a view's uniforms: ``u_clip``, from camera-relative metres to clip space, and ``u_forward``.
 
-    Image rows run downward and so do the target's: row 0 is the first that is read back, and nothing is flipped.
+    Image rows run downward and so do the target's: row 0 is the first that is read back, and nothing is
+    flipped.
     """
     near, far = camera.near, camera.far
     projection = np.array(

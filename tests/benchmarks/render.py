@@ -1,7 +1,7 @@
 """The GL renderer against pyrender: milliseconds a frame, by pass, and the ratio, measured in one run.
 
-Run with ``python -m tests.benchmarks.render``. Both draw the same frames of a shipped scenario in turns, shadowed and
-antialiased, with identity and depth; that they agree is checked before a ratio is printed.
+Run with ``python -m tests.benchmarks.render``. Both draw the same frames of a shipped scenario in turns,
+shadowed and antialiased, with identity and depth; that they agree is checked before a ratio is printed.
 """
 
 from __future__ import annotations

@@ -138,7 +138,7 @@ def stage(*, night: bool = False, wet: float = 0.0) -> Stage:
 
 
 def state(tick: int = 0, *, lamps: Lamps = Lamps.OFF) -> WorldState:
-    """Put five cars on the road: one alone, some behind others, one across the frame's edge, one beside the camera."""
+    """Put five cars on the road: alone, behind others, across the frame's edge, beside the camera."""
     rows = [
         (0, 12.0 + 0.4 * tick, -1.8, 0.0),
         (0, 24.0 + 0.3 * tick, -1.2, 0.05),

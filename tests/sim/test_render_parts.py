@@ -1,0 +1,135 @@
+import numpy as np
+import pytest
+
+from sim.camera import Pose
+from sim.render.antialias import smooth_edges
+from sim.render.ground import cut, fractal, mark_table
+from sim.render.instances import Library, in_bands
+from sim.render.lamps import LIGHTS, LampPlan, halos, lights
+from sim.rng import stream
+from sim.world import FIRST_VEHICLE_ID, Lamps
+from tests.sim.toy_stage import CAMERA, MODELS, POSE, bodies, ground, stage, state
+
+
+def edge(shape: tuple[int, int], slope: float, step: float, samples: int) -> np.ndarray:
+    """Sample a slanted edge: dark below, bright above."""
+    fine = (np.arange(samples) + 0.5) / samples
+    y = (np.arange(shape[0])[:, None] + fine).ravel()
+    x = (np.arange(shape[1])[:, None] + fine).ravel()
+    inside = (y[:, None] < step + slope * x[None]).reshape(shape[0], samples, shape[1], samples)
+    return 40 + 170 * inside.mean(axis=(1, 3))
+
+
+@pytest.mark.parametrize("slope", [0.05, 0.11, 0.3, -0.2])
+def test_smoothed_stairs_are_nearer_to_the_true_edge(slope):
+    shape = (48, 64)
+    stairs, truth = edge(shape, slope, 20.3, 1), edge(shape, slope, 20.3, 16)
+    rgba = np.repeat(np.round(stairs).astype(np.uint8)[..., None], 4, axis=-1)
+    smooth = smooth_edges(rgba)[..., 0].astype(float)
+    before = np.abs(stairs - truth)[4:-4, 16:-16].sum()
+    after = np.abs(smooth - truth)[4:-4, 16:-16].sum()
+    assert after < 0.6 * before
+
+
+def test_flat_parts_and_levels_are_left_alone():
+    rgba = np.full((20, 30, 4), 90, np.uint8)
+    rgba[10:] = 180
+    np.testing.assert_array_equal(smooth_edges(rgba), rgba[..., :3])
+
+
+def test_stretches_hold_every_face_once_and_in_place():
+    whole = ground()
+    parts = cut(whole)
+    assert parts.count.sum() == 3 * len(whole.faces)
+    found = []
+    for k in range(len(parts.first)):
+        index = parts.faces.ravel()[parts.first[k] : parts.first[k] + parts.count[k]] + parts.base_vertex[k]
+        found.append(parts.vertices[index, :3] + parts.origins[k])
+    triangles = np.sort(np.concatenate(found).reshape(-1, 9), axis=0)
+    expected = np.sort(whole.vertices[whole.faces].reshape(-1, 9), axis=0)
+    np.testing.assert_allclose(triangles, expected, atol=1e-3)
+
+
+def test_the_paved_faces_come_first():
+    parts = cut(ground())
+    for k in range(len(parts.first)):
+        index = parts.faces.ravel()[parts.first[k] : parts.first[k] + parts.count[k]] + parts.base_vertex[k]
+        offset = np.abs(parts.vertices[index, 4]).reshape(-1, 3).max(axis=1)
+        paved = int(parts.paved[k]) // 3
+        assert (offset[:paved] <= 8.01).all()
+        assert (offset[paved:] > 8.01).all()
+
+
+def test_what_the_camera_sees_is_a_small_part_of_a_long_road():
+    parts = cut(ground())
+    chosen = parts.select(CAMERA, Pose.looking((900.0, 0.0, 1.2), yaw=0.0))
+    assert 0 < len(chosen) < len(parts.first)
+    behind = parts.upper[:, 0] < 850
+    assert not np.isin(np.flatnonzero(behind), chosen).any()
+
+
+def test_fractal_noise_repeats_without_a_seam():
+    noise = fractal(stream(0, "test"), (128, 128), 1.5)
+    assert noise.std() == pytest.approx(1.0)
+    inner = np.abs(np.diff(noise, axis=1)).mean()
+    assert np.abs(noise[:, 0] - noise[:, -1]).mean() < 1.5 * inner
+
+
+def test_nearest_line_of_each_place():
+    table = mark_table(ground())[0]
+    low, high = -8.0 - 4.0, 8.0 + 4.0
+    place = int((3.7 - low) / (high - low) * 2048)
+    np.testing.assert_allclose(table[place], [3.6, 0.075, 1.0, 0.0])
+    place = int((0.2 - low) / (high - low) * 2048)
+    np.testing.assert_allclose(table[place], [0.15, 0.075, 0.0, 1.0])
+
+
+def test_selection_agrees_with_a_look_at_every_corner():
+    library = Library(MODELS)
+    rng = np.random.default_rng(1)
+    rows = [(0, x, y, yaw) for x, y, yaw in rng.uniform([-40, -40, -3], [120, 40, 3], (300, 3))]
+    cars = bodies(rows, FIRST_VEHICLE_ID)
+    chosen = library.select(cars, CAMERA, POSE)
+    everything = library.select(cars, CAMERA, POSE, widen=1e3)
+    corners = library.corners(cars, everything)
+    local = POSE.to_camera(corners)
+    x = CAMERA.focal * local[..., 0] / local[..., 2] + CAMERA.cx
+    y = CAMERA.focal * local[..., 1] / local[..., 2] + CAMERA.cy
+    ahead = local[..., 2] > CAMERA.near
+    within = ahead & (x > 0) & (x < CAMERA.width) & (y > 0) & (y < CAMERA.height)
+    assert set(everything.rows[within.any(axis=1)].tolist()) <= set(chosen.rows.tolist())
+    assert len(chosen) < 0.6 * len(cars)
+
+
+def test_levels_of_detail_follow_the_distance_and_bands_keep_all():
+    library = Library(MODELS)
+    cars = state().vehicles
+    chosen = library.select(cars, CAMERA, POSE)
+    distance = np.linalg.norm(cars.positions[chosen.rows] - POSE.position + [0, 0, 0.75], axis=1)
+    np.testing.assert_array_equal(chosen.meshes == 1, distance >= 60.0)
+    banded = in_bands(cars, chosen, POSE)
+    assert sorted(banded.rows.tolist()) == sorted(chosen.rows.tolist())
+    commands = library.commands(banded.meshes)
+    assert commands["instances"].sum() == len(banded)
+
+
+def test_lamps_of_a_car_are_where_its_mesh_has_them():
+    plan = LampPlan(MODELS)
+    cars = bodies([(0, 20.0, -1.8, 0.0)], FIRST_VEHICLE_ID, Lamps.TAIL | Lamps.HEAD)
+    burning = plan.burning(cars, CAMERA, POSE, streets=False)
+    assert len(burning.power) == 4
+    tail = burning.position[burning.direction[:, 0] < 0]
+    np.testing.assert_allclose(np.sort(tail[:, 1]), [-0.7, 0.7], atol=0.02)
+    np.testing.assert_allclose(tail[:, 0], 20.0 - 2.22, atol=0.05)
+    glare = halos(burning, CAMERA, night=True)
+    assert len(glare) == 2  # the head lamps shine away from the camera
+    assert (glare["colour"][:, 0] > 5 * glare["colour"][:, 2]).all()
+
+
+def test_dark_cars_have_no_lamps_and_the_list_of_lights_is_full_of_nothing():
+    plan = LampPlan(MODELS)
+    burning = plan.burning(stage().scenery, CAMERA, POSE, streets=False)
+    shining = lights(burning)
+    assert shining.position.shape == (LIGHTS, 3)
+    assert not shining.colour.any()
+    assert len(halos(burning, CAMERA, night=True)) == 0
