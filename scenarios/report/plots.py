@@ -335,7 +335,8 @@ def estimates(rows: Mapping[str, Sequence[Estimate | None]], names: Sequence[str
                 axes.plot(item[1:], [y, y], color=colour, linewidth=1.6, solid_capstyle="round")
                 axes.plot([item[0]], [y], marker="o", markersize=4.5, color=colour)
         lows = [item[1] for items in rows.values() for item in items if item is not None]
-        axes.set(xlim=(min(0.0, *lows, -0.01), 1.02), ylim=(len(rows) - 0.4, -0.6))
+        # What is far below 0 is cut off: it would press all else together.
+        axes.set(xlim=(max(min(0.0, *lows), -0.2) - 0.01, 1.02), ylim=(len(rows) - 0.4, -0.6))
         axes.set_yticks(range(len(rows)), list(rows))
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")

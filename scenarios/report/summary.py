@@ -71,11 +71,11 @@ def write_summary(
             ],
             trackers=list(zip(trackers, (SERIES * len(trackers))[: len(trackers)], strict=True)),
             chart=_chart(trackers, scores),
-            lines=_lines(scores),
+            lines=_lines(scores, len(seeds)),
             paired=[
                 {
                     "title": f"{pair['tracker']} less {pair['against']}",
-                    "lines": _differences(pair["difference"]),
+                    "lines": _differences(pair["difference"], len(seeds)),
                 }
                 for pair in document.get("paired") or ()
             ],
@@ -85,7 +85,7 @@ def write_summary(
                 if (matrix := confusion(run["scores"])) is not None
             ],
             difficulty=[
-                _Line(" · ".join(words(key) for key in keys), "", [_cell(value)])
+                _Line(" · ".join(words(key) for key in keys), "", [_cell(value, len(seeds))])
                 for keys, value in flat(runs[0].get("difficulty") or {})
             ],
             seeds=[
@@ -105,18 +105,19 @@ def _link(directory: Path, report: Path | None) -> str:
     return "" if report is None else quote(report.relative_to(directory).as_posix())
 
 
-def _lines(scores: Sequence[Mapping[tuple[str, ...], Any]]) -> list[_Line]:
+def _lines(scores: Sequence[Mapping[tuple[str, ...], Any]], seeds: int) -> list[_Line]:
     keys = [key for key in dict.fromkeys(key for run in scores for key in run) if "confusion" not in key]
     return [
-        _Line(_name(key), MEANINGS.get(key[-1], ""), [_cell(run.get(key)) for run in scores]) for key in keys
+        _Line(_name(key), MEANINGS.get(key[-1], ""), [_cell(run.get(key), seeds) for run in scores])
+        for key in keys
     ]
 
 
-def _differences(difference: Mapping[str, Any]) -> list[_Line]:
+def _differences(difference: Mapping[str, Any], seeds: int) -> list[_Line]:
     """Return the rows of a comparison; where the interval leaves out 0, the sign stands out."""
     lines = []
     for key, value in flat(difference):
-        cell = _cell(value)
+        cell = _cell(value, seeds)
         bounds = value["ci95"]
         if bounds is not None and (bounds[0] > 0 or bounds[1] < 0):
             good = (bounds[0] > 0) != _lower_is_better(key)
@@ -140,11 +141,13 @@ def _name(key: tuple[str, ...]) -> str:
     return " · ".join(words(part) for part in key if part != "identification")
 
 
-def _cell(value: Any) -> _Cell:
+def _cell(value: Any, seeds: int) -> _Cell:
     if isinstance(value, Mapping):
         bounds = value["ci95"]
-        interval = f"{number(bounds[0])} to {number(bounds[1])}" if bounds else f"n = {value['n']}"
-        return _Cell(number(value["mean"]), interval)
+        parts = [f"{number(bounds[0])} to {number(bounds[1])}"] if bounds else []
+        if value["n"] < seeds or not bounds:
+            parts.append(f"n = {value['n']}")
+        return _Cell(number(value["mean"]), ", ".join(parts))
     return _Cell(number(value))
 
 

@@ -32,6 +32,8 @@ def document() -> dict[str, Any]:
     }
     for found in scores["in-car:paper"]:
         found["hota"] = None
+    scores["in-car"][0]["identification"]["median_seconds_to_identify"] = 0.5
+    scores["in-car"][2]["identification"]["median_seconds_to_identify"] = 0.7
     runs = [
         {
             "scenario": "in-car-day",
@@ -62,7 +64,8 @@ def test_summary_has_every_mean_interval_and_link(document: dict[str, Any], tmp_
         for keys, value in flat(run["scores"]):
             assert number(value) in words, keys
             if isinstance(value, dict):
-                assert f"{number(value['ci95'][0])} to {number(value['ci95'][1])}" in words, keys
+                interval = f"{number(value['ci95'][0])} to {number(value['ci95'][1])}"
+                assert interval + (", n = 2" if value["n"] == 2 else "") in words, keys
     for pair in document["paired"]:
         assert f"{pair['tracker']} less {pair['against']}" in words
         for keys, value in flat(pair["difference"]):
