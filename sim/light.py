@@ -27,8 +27,8 @@ _MOON = np.array([0.0012, 0.0014, 0.0019])
 def make_light(params: LightParams, seed: int) -> Light:
     """Draw the light of an episode.
 
-    By day the sun stands 20 to 60 degrees high at any azimuth; clouds take from its light and turn the sky from blue
-    to grey, rain dims and wets. At night a faint moon and the glow of towns are all but the lamps.
+    By day the sun stands 20 to 60 degrees high at any azimuth; clouds take from its light and turn the sky
+    from blue to grey, rain dims and wets. At night a faint moon and the glow of towns are all but the lamps.
 
     Args:
         params: Time of day, clouds, haze, rain.

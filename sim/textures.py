@@ -22,12 +22,13 @@ _SEED = 20110601
 def texture_array() -> NDArray[np.uint8]:
     """Make the texture of every surface.
 
-    Row 0 is v = 0, the lower edge. All layers but SIGN, PLATE, TAIL_LAMP, HEAD_LAMP and RUBBER, which are shown
-    once a face, repeat without a seam. What the colour and the alpha of a layer mean:
+    Row 0 is v = 0, the lower edge. All layers but SIGN, PLATE, TAIL_LAMP, HEAD_LAMP and RUBBER, which
+    are shown once a face, repeat without a seam. What the colour and the alpha of a layer mean:
 
     - PAINT, CARGO: near-white; it multiplies the body's colour. Alpha: gloss.
     - SIGN: four faces, one a quarter (lower left: speed limit, lower right: warning, upper left: direction
-      board, upper right: gantry board). Alpha: share of marking. Shown is ``mix(body colour, texture, alpha)``.
+      board, upper right: gantry board). Alpha: share of marking; shown is
+      ``mix(body colour, texture, alpha)``.
     - FACADE: alpha is the window mask: 1 on glass, which reflects by day and may be lit at night;
       4 x 4 windows a repeat.
     - TAIL_LAMP: the plain lens; the glow is the renderer's. Faces with u >= 2 are the high lamp: lit by
@@ -37,7 +38,7 @@ def texture_array() -> NDArray[np.uint8]:
     Returns:
         (len(Surface), SIZE, SIZE, 4) uint8, sRGB colour and linear alpha, read-only.
     """
-    layers = np.zeros((len(Surface), SIZE, SIZE, 4))
+    layers: Floats = np.zeros((len(Surface), SIZE, SIZE, 4))
     for surface in Surface:
         layers[surface] = _PAINTERS[surface](stream(_SEED, "textures", surface.name))
     array: NDArray[np.uint8] = (np.clip(layers[:, ::-1], 0, 1) * 255 + 0.5).astype(np.uint8)
@@ -65,7 +66,7 @@ def _fbm(rng: np.random.Generator, cells: int, octaves: int, gain: float = 0.5, 
             break
         lattice = rng.normal(size=(max(1, count // stretch), count))
         total += gain**octave * _smooth(lattice)
-    return (total - total.mean()) / total.std()
+    return np.asarray((total - total.mean()) / total.std())
 
 
 def _smooth(lattice: Floats) -> Floats:

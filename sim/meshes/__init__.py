@@ -1,4 +1,4 @@
-"""Meshes of everything that stands or drives in a scene, made from proportions alone: no files, no random state."""
+"""Meshes of everything that stands or drives in a scene, made from proportions alone."""
 
 from sim.meshes.catalogue import catalogue
 

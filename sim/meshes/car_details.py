@@ -94,6 +94,7 @@ def _axles(shape: CarShape) -> tuple[float, float]:
 
 
 def add_wheels(builder: MeshBuilder, shape: CarShape, detail: int) -> None:
+    """Add four wheels and, on the finest mesh, dark wheel arches."""
     half, radius = shape.width / 2, shape.wheel
     for x in _axles(shape):
         if detail == 0:

@@ -184,7 +184,7 @@ def _windows(builder: MeshBuilder, left: Floats, detail: int) -> None:
 
 
 def _mirrors(builder: MeshBuilder, foot: Floats, detail: int) -> None:
-    """Add the wing mirrors at ``foot`` (3,) on the left and its twin: boxes, or plain leaves on the coarser mesh."""
+    """Add the wing mirrors at ``foot`` (3,) on the left and its twin: boxes, or leaves when coarse."""
     x, z = float(foot[0]), (float(foot[2]) - 0.01, float(foot[2]) + 0.13)
     for side in (1.0, -1.0):
         y0, y1 = sorted((side * (float(foot[1]) + 0.02), side * (float(foot[1]) + 0.20)))

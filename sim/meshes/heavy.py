@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -129,9 +130,11 @@ def _tyres(
     for x in axles:
         if detail == 0:
             builder.box(
-                (x - radius * 0.85, -half * 0.98, 0), (x + radius * 0.85, half * 0.98, radius * 1.5), Surface.PLASTIC,
+                (x - radius * 0.85, -half * 0.98, 0),
+                (x + radius * 0.85, half * 0.98, radius * 1.5),
+                Surface.PLASTIC,
                 without="+z-z",
-            )  # fmt: skip
+            )
             continue
         for side in (1, -1):
             if detail == 2:
@@ -146,9 +149,12 @@ def _tyres(
             else:
                 y = sorted((side * half, side * (half - width)))
                 builder.box(
-                    (x - radius * 0.9, y[0], 0), (x + radius * 0.9, y[1], 2 * radius), Surface.RUBBER,
-                    without="-z+z", unit_uv=True,
-                )  # fmt: skip
+                    (x - radius * 0.9, y[0], 0),
+                    (x + radius * 0.9, y[1], 2 * radius),
+                    Surface.RUBBER,
+                    without="-z+z",
+                    unit_uv=True,
+                )
 
 
 def _lamps(
@@ -169,17 +175,30 @@ def _van(builder: MeshBuilder, size: tuple[float, float, float], detail: int) ->
     rear, front, half = -length / 2, length / 2, width / 2
     hood = 0.56 * height
     profile = [
-        (rear + 0.05, 0.25), (front - 0.03, 0.25), (front, 0.45), (front - 0.10, hood - 0.22), (front - 0.75, hood),
-        (front - 1.55, height - 0.10), (front - 1.95, height), (rear + 0.18, height), (rear + 0.06, height - 0.08),
+        (rear + 0.05, 0.25),
+        (front - 0.03, 0.25),
+        (front, 0.45),
+        (front - 0.10, hood - 0.22),
+        (front - 0.75, hood),
+        (front - 1.55, height - 0.10),
+        (front - 1.95, height),
+        (rear + 0.18, height),
+        (rear + 0.06, height - 0.08),
         (rear + 0.02, 0.30),
-    ]  # fmt: skip
+    ]
     paint = Surface.PAINT
     edges = [Surface.PLASTIC, Surface.PLASTIC, paint, paint, paint, paint, paint, paint, paint, paint]
     shares = [0.97, 0.90, 0.94, 0.96, 0.97, 0.88, 0.86, 0.88, 0.92, 0.98]
     sweep(builder, profile, half, edges, side=paint, tops=shares)
     slope = np.array([0.55, 0.0, 0.8])
-    screen = np.array([(front - 0.80, -half * 0.88, hood + 0.03), (front - 0.80, half * 0.88, hood + 0.03),
-                       (front - 1.50, half * 0.80, height - 0.14), (front - 1.50, -half * 0.80, height - 0.14)])  # fmt: skip
+    screen = np.array(
+        [
+            (front - 0.80, -half * 0.88, hood + 0.03),
+            (front - 0.80, half * 0.88, hood + 0.03),
+            (front - 1.50, half * 0.80, height - 0.14),
+            (front - 1.50, -half * 0.80, height - 0.14),
+        ]
+    )
     builder.decal(screen, Surface.GLASS, facing=slope)
     low, high = 0.42 * height, 0.62 * height
     _lamps(builder, rear + 0.035, half, (0.80, 0.93), (low, high))
@@ -255,8 +274,15 @@ def _cab(
 ) -> None:
     """Add a lorry's cab."""
     back = front - length
-    profile = [(back, 0.45), (front - 0.05, 0.40), (front, 0.75), (front - 0.03, 1.55), (front - 0.28, top - 0.18),
-               (front - 0.60, top), (back, top)]  # fmt: skip
+    profile = [
+        (back, 0.45),
+        (front - 0.05, 0.40),
+        (front, 0.75),
+        (front - 0.03, 1.55),
+        (front - 0.28, top - 0.18),
+        (front - 0.60, top),
+        (back, top),
+    ]
     paint = Surface.PAINT
     sweep(
         builder,
@@ -265,8 +291,14 @@ def _cab(
         [Surface.PLASTIC, Surface.PLASTIC, paint, paint, paint, paint, paint],
         side=paint,
     )
-    screen = np.array([(front - 0.06, -half * 0.92, 1.62), (front - 0.06, half * 0.92, 1.62),
-                       (front - 0.25, half * 0.88, top - 0.28), (front - 0.25, -half * 0.88, top - 0.28)])  # fmt: skip
+    screen = np.array(
+        [
+            (front - 0.06, -half * 0.92, 1.62),
+            (front - 0.06, half * 0.92, 1.62),
+            (front - 0.25, half * 0.88, top - 0.28),
+            (front - 0.25, -half * 0.88, top - 0.28),
+        ]
+    )
     builder.decal(screen, Surface.GLASS, facing=(1, 0, 0.2), lift=0.02)
     for side in (1.0, -1.0):
         y = sorted((side * half * 0.58, side * half * 0.92))
@@ -313,24 +345,46 @@ def _articulated(builder: MeshBuilder, size: tuple[float, float, float], detail:
 def _bus(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -> None:
     length, width, height = size
     rear, front, half = -length / 2, length / 2, width / 2
-    profile = [(rear + 0.05, 0.32), (front - 0.05, 0.32), (front, 0.6), (front - 0.02, 1.3), (front - 0.22, height - 0.15),
-               (front - 0.45, height), (rear + 0.30, height), (rear + 0.08, height - 0.20), (rear, 1.6), (rear, 0.5)]  # fmt: skip
+    profile = [
+        (rear + 0.05, 0.32),
+        (front - 0.05, 0.32),
+        (front, 0.6),
+        (front - 0.02, 1.3),
+        (front - 0.22, height - 0.15),
+        (front - 0.45, height),
+        (rear + 0.30, height),
+        (rear + 0.08, height - 0.20),
+        (rear, 1.6),
+        (rear, 0.5),
+    ]
     paint = Surface.PAINT
     edges = [Surface.PLASTIC, Surface.PLASTIC, *[paint] * 7, Surface.PLASTIC]
     sweep(builder, profile, half, edges, side=paint)
-    screen = np.array([(front - 0.04, -half * 0.94, 1.15), (front - 0.04, half * 0.94, 1.15),
-                       (front - 0.20, half * 0.92, height - 0.35), (front - 0.20, -half * 0.92, height - 0.35)])  # fmt: skip
+    screen = np.array(
+        [
+            (front - 0.04, -half * 0.94, 1.15),
+            (front - 0.04, half * 0.94, 1.15),
+            (front - 0.20, half * 0.92, height - 0.35),
+            (front - 0.20, -half * 0.92, height - 0.35),
+        ]
+    )
     builder.decal(screen, Surface.GLASS, facing=(1, 0, 0.2), lift=0.03)
     top = height - 0.40
     for side in (1.0, -1.0):
         count = 6 if detail == 2 else 1
         edges_x = np.linspace(rear + 0.35, front - 0.5, count + 1)
-        for start, stop in zip(edges_x[:-1], edges_x[1:], strict=True):
+        for start, stop in pairwise(edges_x):
             _pane(builder, side * half, (start + 0.04, stop - 0.04), (1.35, top))
         y = sorted((side * half * 0.60, side * half * 0.92))
         _front_patch(builder, front, (y[0], y[1]), (0.66, 0.86), Surface.HEAD_LAMP, 0.02)
-    back = np.array([(rear + 0.02, half * 0.86, 1.75), (rear + 0.02, -half * 0.86, 1.75),
-                     (rear + 0.07, -half * 0.84, height - 0.38), (rear + 0.07, half * 0.84, height - 0.38)])  # fmt: skip
+    back = np.array(
+        [
+            (rear + 0.02, half * 0.86, 1.75),
+            (rear + 0.02, -half * 0.86, 1.75),
+            (rear + 0.07, -half * 0.84, height - 0.38),
+            (rear + 0.07, half * 0.84, height - 0.38),
+        ]
+    )
     builder.decal(back, Surface.GLASS, facing=BACK, lift=0.02)
     _lamps(builder, rear, half, (0.78, 0.94), (0.85, 1.30))
     _tyres(builder, (rear + 3.3, front - 2.7), half + 0.015, 0.48, 0.40, detail, arch=0.58)

@@ -36,25 +36,34 @@ def plant_models() -> tuple[Model, ...]:
     """Make the trees and bushes."""
     models = [
         Model(
-            name=name, kind=Kind.TREE, size=size, switch=SWITCH,
+            name=name,
+            kind=Kind.TREE,
+            size=size,
+            switch=SWITCH,
             lods=tuple(_broadleaf(name, size, clumps, low, detail) for detail in (2, 1, 0)),
         )
         for name, size, clumps, low in _BROADLEAF
-    ]  # fmt: skip
+    ]
     models += [
         Model(
-            name=name, kind=Kind.TREE, size=size, switch=SWITCH,
+            name=name,
+            kind=Kind.TREE,
+            size=size,
+            switch=SWITCH,
             lods=tuple(_conifer(name, size, detail) for detail in (2, 1, 0)),
         )
         for name, size in _CONIFER
-    ]  # fmt: skip
+    ]
     models += [
         Model(
-            name=name, kind=Kind.BUSH, size=size, switch=SWITCH,
+            name=name,
+            kind=Kind.BUSH,
+            size=size,
+            switch=SWITCH,
             lods=tuple(_bush(name, size, clumps, detail) for detail in (2, 1, 0)),
         )
         for name, size, clumps in _BUSH
-    ]  # fmt: skip
+    ]
     return tuple(models)
 
 
@@ -62,13 +71,46 @@ def _icosahedron() -> tuple[Floats, Floats]:
     """Return unit corners (12, 3) and faces (20, 3)."""
     phi = (1 + 5**0.5) / 2
     corners = np.array(
-        [(-1, phi, 0), (1, phi, 0), (-1, -phi, 0), (1, -phi, 0), (0, -1, phi), (0, 1, phi), (0, -1, -phi), (0, 1, -phi),
-         (phi, 0, -1), (phi, 0, 1), (-phi, 0, -1), (-phi, 0, 1)], float,
-    )  # fmt: skip
+        [
+            (-1, phi, 0),
+            (1, phi, 0),
+            (-1, -phi, 0),
+            (1, -phi, 0),
+            (0, -1, phi),
+            (0, 1, phi),
+            (0, -1, -phi),
+            (0, 1, -phi),
+            (phi, 0, -1),
+            (phi, 0, 1),
+            (-phi, 0, -1),
+            (-phi, 0, 1),
+        ],
+        float,
+    )
     faces = np.array(
-        [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6), (7, 1, 8),
-         (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)],
-    )  # fmt: skip
+        [
+            (0, 11, 5),
+            (0, 5, 1),
+            (0, 1, 7),
+            (0, 7, 10),
+            (0, 10, 11),
+            (1, 5, 9),
+            (5, 11, 4),
+            (11, 10, 2),
+            (10, 7, 6),
+            (7, 1, 8),
+            (3, 9, 4),
+            (3, 4, 2),
+            (3, 2, 6),
+            (3, 6, 8),
+            (3, 8, 9),
+            (4, 9, 5),
+            (2, 4, 11),
+            (6, 2, 10),
+            (8, 6, 7),
+            (9, 8, 1),
+        ],
+    )
     return corners / np.linalg.norm(corners, axis=1, keepdims=True), faces
 
 
@@ -141,9 +183,12 @@ def _broadleaf(name: str, size: tuple[float, float, float], clumps: int, low: fl
     middle = (base + top) / 2
     lean = rng.normal(0, 0.02 * width, 2)
     builder.prism(
-        (0, 0, 0), (lean[0], lean[1], middle), (0.024 * height + 0.06, 0.014 * height), Surface.BARK,
+        (0, 0, 0),
+        (lean[0], lean[1], middle),
+        (0.024 * height + 0.06, 0.014 * height),
+        Surface.BARK,
         sides=(5, 4, 3)[2 - detail],
-    )  # fmt: skip
+    )
     deep = top - base
     angles = np.arange(clumps) * 2.4 + rng.uniform(-0.4, 0.4, clumps)
     lifts = np.linspace(-0.75, 0.85, clumps) + rng.uniform(-0.1, 0.1, clumps)

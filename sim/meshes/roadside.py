@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
-from sim.meshes.builder import MeshBuilder, scaled_to
+from sim.meshes.builder import Floats, MeshBuilder, scaled_to
 from sim.models import Model, Surface
 from sim.world import Kind
 
@@ -71,7 +72,7 @@ def _utility_pole(builder: MeshBuilder, size: tuple[float, float, float], detail
             )
 
 
-def _delineator(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -> None:
+def _delineator(builder: MeshBuilder, size: tuple[float, float, float], _detail: int) -> None:
     length, width, height = size
     half = (length / 2, width / 2)
     builder.box(
@@ -101,14 +102,20 @@ def _lamp_post(builder: MeshBuilder, size: tuple[float, float, float], detail: i
     )
     builder.box((-0.17, -0.75, height - 0.12), (0.17, 0.0, height), Surface.STEEL, without="-z")
     builder.polygon(
-        [(-0.15, -0.70, height - 0.12), (0.15, -0.70, height - 0.12), (0.15, -0.05, height - 0.12), (-0.15, -0.05, height - 0.12)],
-        Surface.STREET_LAMP, facing=(0, 0, -1),
-    )  # fmt: skip
+        [
+            (-0.15, -0.70, height - 0.12),
+            (0.15, -0.70, height - 0.12),
+            (0.15, -0.05, height - 0.12),
+            (-0.15, -0.05, height - 0.12),
+        ],
+        Surface.STREET_LAMP,
+        facing=(0, 0, -1),
+    )
     if detail:
         builder.box((-0.17, foot - 0.17, 0), (0.17, foot + 0.17, 0.35), Surface.STEEL, without="-z")
 
 
-def _quarter(name: str, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _quarter(name: str, y: Floats, z: Floats) -> Floats:
     """Map a face that looks back, spanning ``y`` and ``z``, to its quarter of the texture."""
     u0, v0, u1, v1 = SIGN_FACES[name]
     right = (y.max() - y) / np.ptp(y)
@@ -119,26 +126,26 @@ def _quarter(name: str, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     )
 
 
-def _plate(builder: MeshBuilder, outline: np.ndarray, face: str, x: float) -> None:
+def _plate(builder: MeshBuilder, outline: Floats, face: str, x: float) -> None:
     """Add a flat plate: marked face looking back, bare metal on its other side."""
     y, z = outline[:, 0], outline[:, 1]
     corners = np.stack([np.full(len(y), x - 0.02), y, z], axis=1)
     builder.polygon(corners, Surface.SIGN, facing=(-1, 0, 0), uv=_quarter(face, y, z))
-    builder.polygon(corners + (0.03, 0, 0), Surface.STEEL, facing=(1, 0, 0))
+    builder.polygon(corners + np.array([0.03, 0.0, 0.0]), Surface.STEEL, facing=(1, 0, 0))
 
 
 def _sign(face: str, sides: int) -> _Maker:
-    """Return the maker of a small sign on one post: a polygon of ``sides``, standing on a corner if negative."""
+    """Return the maker of a small sign on one post: a polygon of ``sides``, on a corner if negative."""
 
     def make(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -> None:
         _, width, height = size
         count = abs(sides)
         if count == 3:
-            turn = np.pi / 2 + 2 * np.pi * np.arange(3) / 3
+            turn = np.pi / 2 + 2 * np.pi * np.arange(3.0) / 3
         elif sides < 0:
-            turn = np.pi / 2 * np.arange(4)
+            turn = np.pi / 2 * np.arange(4.0)
         else:
-            turn = 2 * np.pi * (np.arange(count) + 0.5) / count
+            turn = 2 * np.pi * (np.arange(float(count)) + 0.5) / count
         outline = np.stack([np.cos(turn), np.sin(turn)], axis=1)
         outline *= width / np.ptp(outline[:, 0])
         outline[:, 1] += height - outline[:, 1].max()
@@ -202,7 +209,7 @@ def _rail(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -
     if not detail:
         profile = [(0.15, low), (0.15, top)]
     for sign in (1, -1):
-        for (y0, z0), (y1, z1) in zip(profile[:-1], profile[1:], strict=True):
+        for (y0, z0), (y1, z1) in pairwise(profile):
             quad = [
                 (-half, sign * y0, z0),
                 (half, sign * y0, z0),
@@ -223,7 +230,7 @@ def _barrier(builder: MeshBuilder, size: tuple[float, float, float], detail: int
     if not detail:
         profile = [(wide, 0.0), (0.28 * wide, height)]
     for sign in (1, -1):
-        for (y0, z0), (y1, z1) in zip(profile[:-1], profile[1:], strict=True):
+        for (y0, z0), (y1, z1) in pairwise(profile):
             quad = [
                 (-half, sign * y0, z0),
                 (half, sign * y0, z0),
@@ -278,7 +285,7 @@ def _fence(builder: MeshBuilder, size: tuple[float, float, float], detail: int) 
     builder.box((-half, -0.055, 0), (-half + 0.12, 0.055, height), Surface.BARK, without="-z")
 
 
-def _stone_wall(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -> None:
+def _stone_wall(builder: MeshBuilder, size: tuple[float, float, float], _detail: int) -> None:
     length, width, height = size
     half = length / 2
     builder.box(

@@ -88,8 +88,12 @@ def _house(size: tuple[float, float, float], detail: bool) -> Mesh:
     for sign in (1, -1):
         gable = [(sign * half_x, -half_y, eave), (sign * half_x, half_y, eave), (sign * half_x, 0, height)]
         builder.polygon(gable, Surface.CARGO, facing=(sign, 0, 0))
-        slope = [(-length / 2, sign * width / 2, eave - 0.25), (length / 2, sign * width / 2, eave - 0.25),
-                 (length / 2, 0, height), (-length / 2, 0, height)]  # fmt: skip
+        slope = [
+            (-length / 2, sign * width / 2, eave - 0.25),
+            (length / 2, sign * width / 2, eave - 0.25),
+            (length / 2, 0, height),
+            (-length / 2, 0, height),
+        ]
         builder.polygon(slope, Surface.ROOF, facing=(0, sign, 1))
         if detail:
             # Underside of the eaves: a dark line between wall and roof.
@@ -152,7 +156,12 @@ def _bridge(size: tuple[float, float, float]) -> Mesh:
     for sign in (1, -1):
         inner, outer = 0.70 * half_y, half_y
         for x in (-half_x * 0.5, half_x * 0.5):
-            builder.box((x - 0.45, min(sign * inner, sign * (inner + 0.9)), 0), (x + 0.45, max(sign * inner, sign * (inner + 0.9)), soffit), Surface.CONCRETE, without="-z+z")  # fmt: skip
+            builder.box(
+                (x - 0.45, min(sign * inner, sign * (inner + 0.9)), 0),
+                (x + 0.45, max(sign * inner, sign * (inner + 0.9)), soffit),
+                Surface.CONCRETE,
+                without="-z+z",
+            )
         # The embankment that carries the crossing road.
         foot = inner + 1.0
         slope = [
@@ -175,7 +184,7 @@ def _bridge(size: tuple[float, float, float]) -> Mesh:
 
 
 def _woods(letter: str) -> tuple[Mesh, Mesh]:
-    """Make a strip of distant wood along x, fine and coarse: overlapping round crowns, lower toward the ends."""
+    """Make a strip of distant wood along x, fine and coarse: round crowns side by side, lower toward the ends."""
     meshes = []
     for columns in (4, 2):
         rng = stream(_SEED, "woods", letter)

@@ -1,4 +1,4 @@
-"""What stands beside the road: scattered by paper 1's eq. (12), lined up along its edge, or far on the horizon."""
+"""What stands beside the road: scattered by paper 1's eq. (12), in lines along its edge, or far away."""
 
 from sim.scenery.place import place_scenery
 

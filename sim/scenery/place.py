@@ -20,10 +20,10 @@ def place_scenery(
 ) -> Bodies:
     """Place everything that stands beside a road.
 
-    Trees, bushes, signs, poles and buildings are scattered: along the road as Poisson processes (trees in clumps,
-    buildings evenly), across it by eq. (12). Rails, walls, lamp posts and delineators stand in lines at fixed
-    offsets and woods and hills beyond `X_MAX`: they are no part of eq. (12). Each species has random streams of its
-    own, so that more of one moves none of another; only a bridge clears what would stick out of it.
+    Trees, bushes, signs, poles and buildings are scattered: along the road as Poisson processes (trees in
+    clumps, buildings evenly), across it by eq. (12). Rails, walls, lamp posts and delineators stand in lines at
+    fixed offsets, woods and hills farther away than eq. (12) reaches: they are no part of it. Each species has
+    random streams of its own, so that more of one moves none of another; only a bridge clears its own place.
 
     Args:
         road: Where.

@@ -39,7 +39,7 @@ def offset_density(offset: ArrayLike, corridor: float) -> Floats:
 def species_density(road: InCarRoad, params: SceneryParams, species: str, d: ArrayLike) -> Floats:
     """Return the density of a species' offsets d, not normalised.
 
-    The sum over all species is eq. (12) about the middle of the ego's way, cut to what lies outside the asphalt.
+    The sum over all species is eq. (12) about the middle of the ego's way, cut to what is not asphalt.
     """
     d = np.asarray(d, float)
     weights = SETTINGS[params.setting].weights

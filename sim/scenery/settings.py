@@ -16,8 +16,8 @@ class Setting:
 
     Attributes:
         per_km: Scattered things a kilometre, all species together.
-        weights: For each species, (distance from the asphalt's edge in metres, weight) knots, joined by lines. Only
-            the ratio between the species matters: together they always follow eq. (12).
+        weights: For each species, (metres from the asphalt's edge, weight) knots, joined by lines.
+            Only the ratio between the species matters: together they always follow eq. (12).
     """
 
     per_km: float

@@ -1,4 +1,4 @@
-"""Meshes of the catalogue: closed outward, of the stated size, cheap, and with what the detector looks for."""
+"""Meshes: turned outward, of the stated size, cheap, and with what the detector looks for."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_vehicles_carry_what_the_detector_sees(model: Model):
 
 @pytest.mark.parametrize("model", VEHICLES, ids=names(VEHICLES))
 def test_vehicles_have_horizontal_edges_behind(model: Model):
-    """Of the rear faces at least eight distinct heights carry an edge of half a metre or more that is level."""
+    """The rear faces have level edges of half a metre or more at eight heights at least."""
     mesh = model.lods[0]
     rear = face_normals(mesh)[0][:, 0] < -0.3
     edges = np.concatenate([mesh.faces[rear][:, [i, (i + 1) % 3]] for i in range(3)])

@@ -66,8 +66,8 @@ def test_eq_12_has_its_mode_and_normaliser():
 def test_placed_offsets_follow_eq_12(setting):
     """Chi-square of what is placed on 60 km of road against eq. (12) cut at the asphalt.
 
-    Poles and delineators stand in lines too, so the model's names tell the scattered ones; overlapping buildings
-    are left out by `place_scenery`, hence the thin setting (density 0.25).
+    Poles stand in lines too, so that the models' names tell the scattered ones. Buildings that would overlap
+    are left out, hence the thin town (density 0.25).
     """
     road = road_of(length=20000.0)
     params = SceneryParams(setting=setting, bridges=0.0, density=0.25 if setting == "urban" else 1.0)
@@ -97,7 +97,7 @@ def test_placed_offsets_follow_eq_12(setting):
     observed = observed[inside]
     assert observed.sum() > 500
     assert 0.5 * np.abs(observed - expected).sum() / observed.sum() < 0.05, "total variation"
-    # Clumps and even spacing leave the offsets independent; half of a pole-a needs 0.3 m more than its weight.
+    # Clumps and even spacing along the road leave the offsets independent.
     assert stats.chisquare(observed, expected).pvalue > 1e-4
 
 

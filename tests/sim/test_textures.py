@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import subprocess
 import sys
 
@@ -31,10 +32,8 @@ def test_layers_repeat_without_a_seam(surface):
 
 
 def test_same_in_another_process():
-    code = "import hashlib; from sim.textures import texture_array as t; print(hashlib.sha256(t().tobytes()).hexdigest())"
-    import hashlib
-
-    here = hashlib.sha256(texture_array().tobytes()).hexdigest()
+    code = "import hashlib, sim.textures as t; print(hashlib.sha256(t.texture_array()).hexdigest())"
+    here = hashlib.sha256(texture_array()).hexdigest()
     there = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={"PYTHONHASHSEED": "7"}
     )

@@ -1,10 +1,10 @@
-"""Does the simulator look like a camera to a detector? Low-level features of scenarios beside those of recordings.
+"""Does the simulator look like a camera to a detector? Features of scenarios beside those of recordings.
 
-``python -m tests.validation.realism`` prints medians and quartiles of what the in-car tracker's detector finds in one
-frame, and whether each median of the scenario lies within a factor of two of the recordings'. ``--sheet FILE.png``
-writes frames of both, one above the other; ``--frames N`` says how many frames to take of each side.
+``python -m tests.validation.realism`` prints medians and quartiles of what the in-car tracker's detector finds
+in one frame, and whether the scenario's median lies within a factor of two of the recordings'.
+``--sheet FILE.png`` writes frames of both, one above the other; ``--frames N`` says how many of each side.
 
-All frames are brought to 640 x 360: recordings are resized, of the scenario's 640 x 480 the middle rows are taken.
+All frames are brought to 640 x 360: recordings are resized, of the scenario's 640 x 480 the middle is taken.
 """
 
 from __future__ import annotations
@@ -48,7 +48,6 @@ class Measure:
     name: str
     unit: str
     take: Callable[[Grey], NDArray[np.float64]]
-    factor: bool = True
 
 
 def lines(grey: Grey) -> NDArray[np.float64]:
@@ -92,7 +91,7 @@ def spectrum_slope(grey: Grey) -> NDArray[np.float64]:
 
 
 def noise(grey: Grey) -> NDArray[np.float64]:
-    """Robust standard deviation of the noise, grey levels: the calmest 80 % of the finest diagonal wavelet."""
+    """Robust standard deviation of the noise, grey levels: calmest 80 % of the finest diagonal wavelet."""
     block = grey[: HEIGHT // 2 * 2, : WIDTH // 2 * 2].astype(float)
     detail = np.sort(
         np.abs(block[::2, ::2] - block[::2, 1::2] - block[1::2, ::2] + block[1::2, 1::2]).ravel() / 2
