@@ -71,8 +71,8 @@ def _fit(grey, x0, y0, x1, y1, loose, body):  # type: ignore[no-untyped-def]
                 - 0.5 * shift * shift
                 - _beyond((body[0] - left) / wide, 0.25)
                 - _beyond((right - body[2]) / wide, 0.25)
-                - 0.5 * _beyond((left - body[0]) / wide, 0.03)
-                - 0.5 * _beyond((body[2] - right) / wide, 0.03)
+                - _beyond((left - body[0]) / wide, 0.03)
+                - _beyond((body[2] - right) / wide, 0.03)
             )
             if value > best:
                 best, best_l, best_r = value, left, right

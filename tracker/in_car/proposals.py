@@ -21,6 +21,8 @@ SLIMMEST, USUAL, WIDEST = 0.85, 1.45, 2.6
 ROOM, ROOM_WIDTH = 200.0, 60.0
 
 
+# How far around a window its cut-off parts are looked for, as a share of its width: less than the gap between two lanes.
+CUT = 0.3
 # Log odds beyond which more points add nothing: how well they fill a window is to decide, not how many they are.
 ENOUGH = 50.0
 # How far the points of one body may move apart over the remembered time: px, and as a share of its width.
@@ -51,47 +53,51 @@ def _score(windows, x, y, u, v, evidence, horizon):  # type: ignore[no-untyped-d
         x0, y0, x1, y1 = windows[k, 0], windows[k, 1], windows[k, 2], windows[k, 3]
         wide, tall = x1 - x0, y1 - y0
         play = 0.04 * wide + 1.0
-        total, positive, negative, beside = 0.0, 0, 0, 0.0
+        total, positive, negative = 0.0, 0, 0
         s, sx, sy, sxx, syy = 0.0, 0.0, 0.0, 0.0, 0.0
         su, sv, suu = 0.0, 0.0, 0.0
         for i in range(x.size):
-            if y[i] < y0 - play or y[i] > y1 + 0.2 * tall or x[i] < x0 - 0.5 * wide or x[i] > x1 + 0.5 * wide:
+            if not (x0 - play <= x[i] <= x1 + play and y0 - play <= y[i] <= y1 + play):
                 continue
             value = min(max(evidence[i], -4.0), 4.0)
             # Above the horizon far scenery moves like a vehicle: it cannot speak for one.
             if y[i] < horizon + 2.0:
                 value = min(value, 0.0)
-            if x0 - play <= x[i] <= x1 + play and y[i] <= y1 + play:
-                total += value
-                if value > 0.8:
-                    positive += 1
-                    s += value
-                    sx += value * x[i]
-                    sy += value * y[i]
-                    sxx += value * x[i] * x[i]
-                    syy += value * y[i] * y[i]
-                    su += value * u[i]
-                    sv += value * v[i]
-                    suu += value * (u[i] * u[i] + v[i] * v[i])
-                elif value < -0.8:
-                    negative += 1
-            elif value > 0.8:
-                beside += value
+            total += value
+            if value > 0.8:
+                positive += 1
+                s += value
+                sx += value * x[i]
+                sy += value * y[i]
+                sxx += value * x[i] * x[i]
+                syy += value * y[i] * y[i]
+                su += value * u[i]
+                sv += value * v[i]
+                suu += value * (u[i] * u[i] + v[i] * v[i])
+            elif value < -0.8:
+                negative += 1
         scores[k, 1] = positive
         scores[k, 2] = negative
         if positive < 2:
             scores[k, 0] = -1e9
             continue
-        # A window that cuts through a body, or lies on scenery that all moves alike, has its like beside it.
-        size = np.log(wide / ((y1 - horizon) * USUAL)) / 0.3
-        cost = misfit(s, sx, sy, sxx, syy, x0, y1, wide) + 0.5 * size * size
-        # One body moves as one.
+        # One body moves as one; and what lies just outside and moves along is a part of it that was cut off.
+        moves = BODY_PLAY + BODY_SHARE * wide
         scatter = max(suu - (su * su + sv * sv) / s, 0.0) / s
-        cost += scatter / (BODY_PLAY + BODY_SHARE * wide) ** 2
-        scores[k, 0] = (
-            min(total, ENOUGH) * np.exp(-0.8 * cost)
-            - 0.3 * beside
-            - wide * tall / (ROOM * max(1.0, wide / ROOM_WIDTH) ** 2)
+        cut = 0.0
+        reach = CUT * wide
+        for i in range(x.size):
+            if x[i] < x0 - reach or x[i] > x1 + reach or y[i] < max(y0 - reach, horizon + 2.0) or y[i] > y1 + reach:
+                continue
+            if x0 - play <= x[i] <= x1 + play and y0 - play <= y[i] <= y1 + play:
+                continue
+            if evidence[i] > 0.8 and abs(u[i] - su / s) < moves and abs(v[i] - sv / s) < moves:
+                cut += min(evidence[i], 4.0)
+        size = np.log(wide / ((y1 - horizon) * USUAL)) / 0.3
+        cost = misfit(s, sx, sy, sxx, syy, x0, y1, wide) + 0.5 * size * size + scatter / moves**2
+        whole = s / (s + cut)
+        scores[k, 0] = min(total, ENOUGH) * np.exp(-0.8 * cost) * whole * whole - wide * tall / (
+            ROOM * max(1.0, wide / ROOM_WIDTH) ** 2
         )
     return scores
 

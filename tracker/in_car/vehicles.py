@@ -90,7 +90,7 @@ class VehicleStore:
             self._weigh(vehicle, points, ratios, trust, ego)
             self._hold(vehicle, grey, points, horizon)
         self._end(grey, points, horizon)
-        self._join(points, ego.speed)
+        self._join(points, moved, ego.speed)
         self._begin(grey, points, moved, segments, horizon, farthest)
 
     def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats) -> None:
@@ -240,21 +240,27 @@ class VehicleStore:
                 kept.append(vehicle)
         self.vehicles = sorted(kept, key=lambda one: one.id)
 
-    def _join(self, points: PointStore, moving: float) -> None:
+    def _join(self, points: PointStore, moved: Floats, moving: float) -> None:
         """Give new points on a vehicle to it, and take back those that lie outside."""
         x, y = points.position.T
         for vehicle in self.vehicles:
             box = vehicle.box
             wide, tall = box[2] - box[0], box[3] - box[1]
             own = points.owner == vehicle.id
-            far = (x < box[0] - 0.12 * wide) | (x > box[2] + 0.12 * wide)
-            far |= (y < box[1] - 0.25 * tall) | (y > box[3] + 0.08 * tall)
+            far = (x < box[0] - 0.3 * wide) | (x > box[2] + 0.3 * wide)
+            far |= (y < box[1] - 0.35 * wide) | (y > box[3] + 0.2 * wide)
             points.owner[own & far] = 0
             inside = (x > box[0] + 0.03 * wide) & (x < box[2] - 0.03 * wide)
             inside &= (y > box[1] + 0.03 * tall) & (y < box[3] + 0.02 * tall)
+            fringe = (x > box[0] - 0.25 * wide) & (x < box[2] + 0.25 * wide)
+            fringe &= (y > box[1] - 0.3 * wide) & (y < box[3] + 0.15 * wide) & (points.evidence > 2.0)
             middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])])
             expected = vehicle.velocity + vehicle.growth * (points.position - middle)
             along = np.abs(points.flow - expected).max(1) < 0.7 + 0.01 * wide
+            if vehicle.members >= 3:
+                # What is just outside may be a part of it, if over a longer time it moves along.
+                usual = np.median(moved[own], axis=0) if own.any() else np.zeros(2)
+                inside |= fringe & (np.abs(moved - usual).max(1) < 0.8 * BODY_PLAY + BODY_SHARE * wide)
             fresh = inside & along & (points.owner == 0) & (points.age >= 3)
             fresh &= (points.evidence > 0.3) | (moving < 2.0)
             points.owner[fresh] = vehicle.id
