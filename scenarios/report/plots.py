@@ -2,59 +2,26 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
 import itertools
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup
-from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import TwoSlopeNorm
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from scenarios.report.history import TraceSamples
 from scenarios.report.palette import DOTS, LABELS, NO_TRACK, SERIES, identity
+from scenarios.report.svg import draw_svg
 from tracker.types import Label
 
 Floats = NDArray[np.float64]
 
 Estimate = tuple[float, float, float]
 """A value, and where its 95 % interval begins and ends."""
-
-_INK, _RULE = "#010203", "#010204"  # stand-ins: the page's own ink and rules take their place
-_STYLE: dict[str, object] = {
-    "axes.edgecolor": _RULE,
-    "axes.facecolor": "none",
-    "axes.grid": True,
-    "axes.labelcolor": _INK,
-    "axes.labelsize": 8.5,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "figure.facecolor": "none",
-    "font.family": "DejaVu Sans",
-    "font.size": 8.5,
-    "grid.color": _RULE,
-    "grid.linewidth": 0.5,
-    "legend.fontsize": 8,
-    "legend.frameon": False,
-    "lines.linewidth": 1.4,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "testtrack",
-    "text.color": _INK,
-    "xtick.color": _RULE,
-    "xtick.labelcolor": _INK,
-    "xtick.labelsize": 8,
-    "ytick.color": _RULE,
-    "ytick.labelcolor": _INK,
-    "ytick.labelsize": 8,
-}
-_DPI = 144
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +96,7 @@ def profile(
             )
         axes.set(xlim=(0, width), ylim=(seconds, 0), xlabel="x, px", ylabel="time, s")
 
-    svg, (_, y0, _, y1) = _draw(draw, size=(3.7, 4.5), margins=(0.58, 0.12, 0.44, 0.08))
+    svg, (_, y0, _, y1) = draw_svg(draw, size=(3.7, 4.5), margins=(0.58, 0.12, 0.44, 0.08))
     return svg, TimeAxis(vertical=True, low=1 - y1, high=1 - y0, seconds=seconds)
 
 
@@ -213,12 +180,12 @@ def likelihoods(
     return (
         (
             "Background: p(x, v | B)",
-            _draw(density(background), size=(3.7, 3.1), margins=(0.55, 0.62, 0.44, 0.08))[0],
+            draw_svg(density(background), size=(3.7, 3.1), margins=(0.55, 0.62, 0.44, 0.08))[0],
         ),
-        ("Car: p(x, v | C)", _draw(density(car), size=(3.7, 3.1), margins=(0.55, 0.62, 0.44, 0.08))[0]),
+        ("Car: p(x, v | C)", draw_svg(density(car), size=(3.7, 3.1), margins=(0.55, 0.62, 0.44, 0.08))[0]),
         (
             "Car against background: log ratio",
-            _draw(draw_ratio, size=(3.7, 3.1), margins=(0.55, 0.62, 0.44, 0.08))[0],
+            draw_svg(draw_ratio, size=(3.7, 3.1), margins=(0.55, 0.62, 0.44, 0.08))[0],
         ),
     )
 
@@ -342,7 +309,7 @@ def estimates(rows: Mapping[str, Sequence[Estimate | None]], names: Sequence[str
         axes.grid(visible=False, axis="y")
         axes.spines["left"].set_visible(False)
 
-    return _draw(draw, size=(4.6, 0.5 + 0.34 * len(rows)), margins=(1.25, 0.1, 0.3, 0.05))[0]
+    return draw_svg(draw, size=(4.6, 0.5 + 0.34 * len(rows)), margins=(1.25, 0.1, 0.3, 0.05))[0]
 
 
 def _finish_lines(
@@ -355,38 +322,5 @@ def _finish_lines(
 
 
 def _over_time(draw: Callable[[Axes], None], seconds: float) -> tuple[Markup, TimeAxis]:
-    svg, (x0, _, x1, _) = _draw(draw, size=(5.0, 2.1), margins=(0.56, 0.16, 0.44, 0.24))
+    svg, (x0, _, x1, _) = draw_svg(draw, size=(5.0, 2.1), margins=(0.56, 0.16, 0.44, 0.24))
     return svg, TimeAxis(vertical=False, low=x0, high=x1, seconds=seconds)
-
-
-def _draw(
-    draw: Callable[[Axes], None], *, size: tuple[float, float], margins: tuple[float, float, float, float]
-) -> tuple[Markup, tuple[float, float, float, float]]:
-    """Return a figure's SVG, and where its axes stand in it: left, bottom, right, top as shares.
-
-    ``size`` and ``margins`` (left, right, bottom, top) are inches. They are fixed, since an automatic layout
-    takes as long as the drawing.
-    """
-    (width, height), (left, right, bottom, top) = size, margins
-    with rc_context(_STYLE):  # type: ignore[arg-type]
-        figure = Figure(figsize=size, dpi=_DPI)
-        figure.subplots_adjust(left / width, bottom / height, 1 - right / width, 1 - top / height)
-        axes = figure.subplots()
-        draw(axes)
-        buffer = io.StringIO()
-        figure.savefig(buffer, format="svg", dpi=_DPI, metadata={"Date": None, "Creator": None})
-        extents = axes.get_position().extents
-    return _inline(buffer.getvalue()), (extents[0], extents[1], extents[2], extents[3])
-
-
-def _inline(text: str) -> Markup:
-    """Turn a matplotlib SVG file into an element: no prolog or metadata, the page's colours, own ids."""
-    digest = hashlib.sha256(text.encode()).hexdigest()[:8]
-    text = text[text.index("<svg") :]
-    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
-    text = re.sub(r'<g id="[^"]*">', "<g>", text)
-    text = re.sub(r'^<svg [^>]*viewBox="([^"]*)"[^>]*>', r'<svg viewBox="\1" role="img">', text)
-    text = re.sub(r'( id="|url\(#|href="#)', rf"\g<1>{digest}-", text)
-    text = text.replace(_INK, "currentColor").replace(_RULE, "var(--rule)")
-    # It is matplotlib's own output, with every text in it escaped, so it need not be escaped again.
-    return Markup(text)
