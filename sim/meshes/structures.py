@@ -184,7 +184,7 @@ def _bridge(size: tuple[float, float, float]) -> Mesh:
 
 
 def _woods(letter: str) -> tuple[Mesh, Mesh]:
-    """Make a strip of distant wood along x, fine and coarse: round crowns side by side, lower toward the ends."""
+    """Make a strip of distant wood along x, fine and coarse: round crowns, lower toward the ends."""
     meshes = []
     for columns in (4, 2):
         rng = stream(_SEED, "woods", letter)

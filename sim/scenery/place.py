@@ -21,9 +21,9 @@ def place_scenery(
     """Place everything that stands beside a road.
 
     Trees, bushes, signs, poles and buildings are scattered: along the road as Poisson processes (trees in
-    clumps, buildings evenly), across it by eq. (12). Rails, walls, lamp posts and delineators stand in lines at
-    fixed offsets, woods and hills farther away than eq. (12) reaches: they are no part of it. Each species has
-    random streams of its own, so that more of one moves none of another; only a bridge clears its own place.
+    clumps, buildings evenly), across it by eq. (12). Rails, walls, lamp posts and delineators stand in lines
+    at fixed offsets, woods and hills farther away than eq. (12) reaches: they are no part of it. Each species
+    has random streams of its own, so that more of one moves none of another; a bridge clears its own place.
 
     Args:
         road: Where.

@@ -1,7 +1,7 @@
 """Does the simulator look like a camera to a detector? Features of scenarios beside those of recordings.
 
-``python -m tests.validation.realism`` prints medians and quartiles of what the in-car tracker's detector finds
-in one frame, and whether the scenario's median lies within a factor of two of the recordings'.
+``python -m tests.validation.realism`` prints medians and quartiles of what the in-car tracker's detector
+finds in one frame, and whether the scenario's median lies within a factor of two of the recordings'.
 ``--sheet FILE.png`` writes frames of both, one above the other; ``--frames N`` says how many of each side.
 
 All frames are brought to 640 x 360: recordings are resized, of the scenario's 640 x 480 the middle is taken.
