@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 
 # Vehicle: standard deviation of the closing speed as a share of the ego's and beside it (m/s), and sideways (m/s).
 CLOSING_SHARE, CLOSING, SIDEWAYS = 0.13, 1.5, 0.8
+# Ego speed below which standing still speaks less and less against a vehicle, m/s.
+WALK = 3.0
 # Static: share of points on the ground itself; those above it follow an exponential in e / (g y) - 1 with this mean.
 ON_GROUND, ABOVE = 0.45, 1.0
 # Least and greatest distance of what stands at or above the horizon, metres.
@@ -120,17 +122,19 @@ def motion_evidence(
 ) -> Floats:
     """Return `log_ratios` of points at (N, 2) from the focus of expansion that moved by (N, 2) in (N,) seconds."""
     middle = relative - 0.5 * moved
+    speed = ground * focal * HEIGHT
     ratios: Floats = log_ratios(
         np.ascontiguousarray(middle[:, 0]),
         np.ascontiguousarray(middle[:, 1]),
         np.ascontiguousarray(moved[:, 0]),
         np.ascontiguousarray(moved[:, 1]),
         seconds,
-        ground * focal * HEIGHT,
+        speed,
         ground,
         focal,
         focal * yaw_rate,
         2.0 * FLOW_NOISE,
         horizon_error,
     )
-    return ratios
+    # While the ego stands, vehicles in a queue stand like everything else; what moves is no scenery even then.
+    return np.where(ratios < 0.0, ratios * min(1.0, speed / WALK), ratios)

@@ -41,7 +41,9 @@ def misfit(weight, x, y, xx, yy, x0, y1, wide):  # type: ignore[no-untyped-def]
     spread_x = math.sqrt(max(xx / weight - mean_x * mean_x, 0.0)) / wide
     spread_y = math.sqrt(max(yy / weight - mean_y * mean_y, 0.0)) / wide
     cost = (off_x / 0.15) ** 2 + off_y**2
-    cost += (min(spread_x / SPREAD_X - 1.0, 0.0) / 0.35) ** 2 + 0.5 * (min(spread_y / SPREAD_Y - 1.0, 0.0) / 0.5) ** 2
+    cost += (min(spread_x / SPREAD_X - 1.0, 0.0) / 0.35) ** 2 + 0.5 * (
+        min(spread_y / SPREAD_Y - 1.0, 0.0) / 0.5
+    ) ** 2
     return 0.5 * cost
 
 
@@ -87,7 +89,12 @@ def _score(windows, x, y, u, v, evidence, horizon):  # type: ignore[no-untyped-d
         cut = 0.0
         reach = CUT * wide
         for i in range(x.size):
-            if x[i] < x0 - reach or x[i] > x1 + reach or y[i] < max(y0 - reach, horizon + 2.0) or y[i] > y1 + reach:
+            if (
+                x[i] < x0 - reach
+                or x[i] > x1 + reach
+                or y[i] < max(y0 - reach, horizon + 2.0)
+                or y[i] > y1 + reach
+            ):
                 continue
             if x0 - play <= x[i] <= x1 + play and y0 - play <= y[i] <= y1 + play:
                 continue

@@ -90,7 +90,14 @@ class InCarTracker:
         self._front.horizon, self._front.centre_x = horizon * scale, float(ego.focus[0]) * scale
         self._front.look(picture)
         self._vehicles.step(
-            grey, points, moved * (CORRELATION / np.maximum(seconds, 1e-3))[:, None], ratios, trust, self._front.features.segments, ego, focal * HEIGHT / REACH
+            grey,
+            points,
+            moved * (CORRELATION / np.maximum(seconds, 1e-3))[:, None],
+            ratios,
+            trust,
+            self._front.features.segments,
+            ego,
+            focal * HEIGHT / REACH,
         )
         traces = self._front.trace(float(ego.shift[1]))
         tracks = self._tracks(scale)

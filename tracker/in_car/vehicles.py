@@ -10,7 +10,17 @@ from numpy.typing import NDArray
 from tracker.in_car.evidence import CLOSING, CLOSING_SHARE
 from tracker.in_car.extent import fit_extent
 from tracker.in_car.points import PointStore
-from tracker.in_car.proposals import BODY_PLAY, BODY_SHARE, SLIMMEST, USUAL, WIDEST, misfit, propose, windows_from_points, windows_from_segments
+from tracker.in_car.proposals import (
+    BODY_PLAY,
+    BODY_SHARE,
+    SLIMMEST,
+    USUAL,
+    WIDEST,
+    misfit,
+    propose,
+    windows_from_points,
+    windows_from_segments,
+)
 from tracker.in_car.yaw import FLOW_NOISE, HEIGHT, EgoMotion
 from tracker.types import Status
 
@@ -137,7 +147,9 @@ class VehicleStore:
     def _measure_scale(self, vehicle: Vehicle, scale: float, power: float) -> None:
         """Average the rate at which the points of a vehicle move apart, 1/s (scale divergence)."""
         gain = max(1.0 / (self._rate * 0.6), 1.0 / (vehicle.age + 1.0))
-        vehicle.rate_of_scale += gain * (float(np.clip(scale, -0.1, 0.1)) * self._rate - vehicle.rate_of_scale)
+        vehicle.rate_of_scale += gain * (
+            float(np.clip(scale, -0.1, 0.1)) * self._rate - vehicle.rate_of_scale
+        )
         noise = 1.5 * FLOW_NOISE * self._rate / np.sqrt(max(power, 30.0))
         vehicle.rate_error = float(noise * np.sqrt(gain))
 
@@ -165,7 +177,11 @@ class VehicleStore:
         else:
             # Nothing speaks for it any more: while the ego moves, old evidence fades.
             gain = -vehicle.odds * min(ego.speed / 10.0, 1.0) / (2.0 * self._rate)
-        gain += 0.7 * self._divergence(vehicle, float(vehicle.box[3] - ego.focus[1]), ego) / (self._rate * CORRELATION)
+        gain += (
+            0.7
+            * self._divergence(vehicle, float(vehicle.box[3] - ego.focus[1]), ego)
+            / (self._rate * CORRELATION)
+        )
         gain -= self._ill_filled(vehicle, points) / (self._rate * CORRELATION)
         gain -= self._alike(vehicle, points) / (self._rate * CORRELATION)
         vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
@@ -286,7 +302,9 @@ class VehicleStore:
             ]
         )
         contact = windows[:, 3] - horizon
-        windows = windows[(contact >= farthest) & (contact <= NEAREST_SHARE * farthest) & (windows[:, 3] < len(grey))]
+        windows = windows[
+            (contact >= farthest) & (contact <= NEAREST_SHARE * farthest) & (windows[:, 3] < len(grey))
+        ]
         for window in propose(
             windows, position[free], moved[free], points.evidence[free], horizon, least=4.0
         ):

@@ -209,7 +209,8 @@ class EgoMotion:
     def _learn_ground(
         self, position: Floats, moved: Floats, seconds: Floats, weight: Floats, speed: float | None
     ) -> None:
-        below = position - self.focus
+        # Rate and row both of the middle of the time.
+        below = position - 0.5 * moved - self.focus
         rate, error = self.expansion(position, moved, seconds)
         # The corridor of the road: three metres to each side.
         use = (weight > 0) & (below[:, 1] > 14.0) & (np.abs(below[:, 0]) < 3.0 * below[:, 1])

@@ -1,0 +1,88 @@
+"""The camera's own motion and the evidence of a point's motion, on points made up from geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tracker.in_car.evidence import motion_evidence
+from tracker.in_car.yaw import HEIGHT, EgoMotion
+
+FOCAL, RATE = 800.0, 30.0
+FOCUS = np.array([330.0, 228.0])
+
+
+def static_points(rng, count):
+    """Points on the ground and above it: X, Y (down), Z."""
+    z = rng.uniform(6, 60, count)
+    x = rng.uniform(-1, 1, count) * 0.35 * z
+    y = np.where(rng.random(count) < 0.6, HEIGHT, rng.uniform(-4, 1, count))
+    return np.stack([x, y, z], 1)
+
+
+def project(points):
+    return FOCAL * points[:, :2] / points[:, 2:] + FOCUS
+
+
+def turn(yaw, pitch):
+    """Rotation of camera coordinates for a camera that turns right and up."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    around_y = np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
+    cos, sin = np.cos(pitch), np.sin(pitch)
+    around_x = np.array([[1, 0, 0], [0, cos, sin], [0, -sin, cos]])
+    return around_x @ around_y
+
+
+@pytest.mark.parametrize("yaw_rate", [-0.15, 0.0, 0.08])
+def test_rotation_is_found_and_removed(yaw_rate):
+    rng = np.random.default_rng(1)
+    ego = EgoMotion(focal=FOCAL, focus=(330.0, 228.0), sure=True, rate=RATE)
+    for _ in range(60):
+        before = static_points(rng, 150)
+        pitch = rng.normal(0, 0.001)
+        after = (before - np.array([0, 0, 20.0 / RATE])) @ turn(yaw_rate / RATE, pitch).T
+        flow = project(after) - project(before) + rng.normal(0, 0.1, (150, 2))
+        rotation = ego.rotate(project(after), flow, np.ones(150))
+    assert abs(ego.yaw_rate - yaw_rate) < 0.012
+    straight = project(before - np.array([0, 0, 20.0 / RATE])) - project(before)
+    assert np.abs(np.median(flow - rotation - straight, axis=0)).max() < 0.35
+
+
+def test_focus_and_ground_are_learnt():
+    rng = np.random.default_rng(2)
+    ego = EgoMotion(focal=FOCAL, focus=(320.0, 240.0), sure=True, rate=RATE)
+    for _ in range(200):
+        now = static_points(rng, 120)
+        moved = project(now) - project(now + np.array([0, 0, 20.0 * 0.3])) + rng.normal(0, 0.3, (120, 2))
+        ego.learn(project(now), moved, np.full(120, 0.3), np.ones(120))
+    assert np.abs(ego.focus - FOCUS).max() < 5.0
+    assert ego.speed == pytest.approx(20.0, rel=0.15)
+
+
+def test_vehicles_and_scenery_are_told_apart():
+    rng = np.random.default_rng(3)
+    seconds, speed = 0.35, 20.0
+    static = static_points(rng, 400)
+    static = static[static[:, 1] > 0.3]
+    vehicle = static.copy()
+    vehicle[:, 1] = rng.uniform(0.4, HEIGHT, len(vehicle))
+    for points, closing, sign in ((static, speed, -1), (vehicle, rng.normal(0, 1.5), 1)):
+        moved = project(points) - project(points + np.array([0, 0, closing * seconds]))
+        moved += rng.normal(0, 0.3, moved.shape)
+        ratios = motion_evidence(
+            project(points) - FOCUS,
+            moved,
+            np.full(len(points), seconds),
+            ground=speed / (FOCAL * HEIGHT),
+            focal=FOCAL,
+            yaw_rate=0.0,
+        )
+        assert (sign * ratios > 0).mean() > 0.9
+
+
+def test_standing_still_says_nothing_against_a_static_thing():
+    points = np.array([[60.0, 30.0], [-120.0, 60.0]])
+    ratios = motion_evidence(
+        points, np.zeros((2, 2)), np.full(2, 0.35), ground=0.0, focal=FOCAL, yaw_rate=0.0
+    )
+    assert (np.abs(ratios) < 1.5).all()

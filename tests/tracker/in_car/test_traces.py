@@ -1,0 +1,53 @@
+"""Traces: slope, identity, gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracker.in_car.profile import SEGMENT, Centres
+from tracker.in_car.traces import TraceStore, slope_error
+
+RATE = 30.0
+
+
+def centres(*places):
+    count = len(places)
+    x = np.array([place[0] for place in places], float)
+    y = np.array([place[1] for place in places], float)
+    return Centres(
+        x=x,
+        y=y,
+        width=np.full(count, 20.0),
+        weight=np.full(count, 40.0),
+        kind=np.full(count, SEGMENT, np.uint8),
+        points=np.stack([x, y], 1).reshape(-1, 2),
+        owners=np.arange(count),
+    )
+
+
+def test_slope_and_identity_of_two_crossing_rows():
+    store = TraceStore(rate=RATE)
+    for tick in range(40):
+        # At the same x in the middle of the time, but at different heights.
+        store.step(centres((200 + tick, 100), (240 - tick, 160)))
+    assert store.ids.tolist() == [1, 2]
+    slope, error = store.slopes()
+    assert np.allclose(slope, [RATE, -RATE], atol=1e-6)
+    assert (error > 0).all()
+
+
+def test_a_short_gap_keeps_the_id_and_a_long_one_does_not():
+    store = TraceStore(rate=RATE)
+    for tick in range(40):
+        gone = 15 <= tick < 19 or 28 <= tick < 38
+        store.step(centres() if gone else centres((100 + tick, 50)))
+        if tick == 27:
+            assert store.ids.tolist() == [1]
+    assert store.ids.tolist() == [2]
+
+
+def test_slope_error_is_that_of_a_line_fit():
+    rng = np.random.default_rng(0)
+    times = np.arange(12) / RATE
+    slopes = [np.polyfit(times, rng.normal(0, 0.5, 12), 1)[0] for _ in range(4000)]
+    assert np.isclose(np.std(slopes), slope_error(0.5, RATE, np.array([12]))[0], rtol=0.05)
