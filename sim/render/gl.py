@@ -28,7 +28,7 @@ _ROOM = 8192  # instances and draws in a frame
 _SHADOW_REACH = 120.0  # metres within which bodies cast shadows
 _SHADOW_WIDEN = 2.5  # half-widths of the frame within which they do
 _BEAM = 130.0
-# Share of the body's colour (2: by the texture's alpha), least reflection, more by the alpha, retro-reflection.
+# Share of the body's colour (2: by the texture's alpha), reflection, more by the alpha, retro-reflection.
 _GLOSS = {
     Surface.PAINT: (1.0, 0.055, 0.02, 0.0),
     Surface.GLASS: (0.0, 0.22, 0.0, 0.0),

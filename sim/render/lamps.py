@@ -169,9 +169,9 @@ def _centres(model: Model, surface: Surface) -> NDArray[np.float64]:
     own = mesh.surfaces == surface
     if surface is Surface.TAIL_LAMP:
         own &= mesh.uvs[:, 0] < _HIGH_LAMP_U
-    points = mesh.vertices[own].astype(float)
+    points = np.asarray(mesh.vertices[own], np.float64)
     if surface is Surface.STREET_LAMP:
-        return points.mean(axis=0, keepdims=True) if len(points) else points
+        return points if not len(points) else np.asarray(points.mean(axis=0, keepdims=True))
     sides = [points[points[:, 1] > 0.02], points[points[:, 1] < -0.02]]
     middles = [side.mean(axis=0) for side in sides if len(side)]
     return np.asarray(middles, np.float64).reshape(-1, 3)
