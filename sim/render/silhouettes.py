@@ -22,6 +22,9 @@ from sim.world import Bodies
 
 Ints = NDArray[np.int64]
 
+_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1])
+"""The twelve edges of a box, as pairs of the corners that `Library.corners` gives."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawing:
@@ -40,14 +43,26 @@ def image_boxes(library: Library, bodies: Bodies, selection: Selection, camera: 
     """Return (M, 4) x0, y0, x1, y1 px that surely hold the selected bodies, cut at the extended frame."""
     corners = library.corners(bodies, selection)
     local = (corners - pose.position) @ pose.rotation.T
-    depth = local[..., 2]
-    cut = (depth < camera.near).any(axis=1)
-    safe = np.where(depth < camera.near, 1.0, depth)
-    x = camera.focal * local[..., 0] / safe + camera.cx
-    y = camera.focal * local[..., 1] / safe + camera.cy
     width, height = camera.width, camera.height
-    box = np.stack([x.min(1) - 1, y.min(1) - 1, x.max(1) + 2, y.max(1) + 2], axis=1)
-    box[cut] = -width, -height, 2 * width, 2 * height
+    # What lies wholly to one side enters the extended frame only from some depth on: cut it there.
+    aside = np.where(np.ptp(np.sign(local[..., 0]), axis=1) == 0, np.abs(local[..., 0]).min(axis=1), 0.0)
+    slope = (width + max(camera.cx, width - camera.cx)) / camera.focal
+    nearest = np.maximum(camera.near, aside / slope)[:, None]
+    start, end = local[:, _EDGES[:, 0]], local[:, _EDGES[:, 1]]
+    crossing = (start[..., 2] < nearest) != (end[..., 2] < nearest)
+    span = np.where(crossing, end[..., 2] - start[..., 2], 1.0)
+    met = start + ((nearest - start[..., 2]) / span)[..., None] * (end - start)
+    points = np.concatenate([local, met], axis=1)
+    used = np.concatenate([local[..., 2] >= nearest, crossing], axis=1)
+    depth = np.where(used, points[..., 2], 1.0)
+    x = np.where(used, camera.focal * points[..., 0] / depth + camera.cx, np.nan)
+    y = np.where(used, camera.focal * points[..., 1] / depth + camera.cy, np.nan)
+    kept = used.any(axis=1)
+    box = np.zeros((len(local), 4))
+    low_x, low_y, high_x, high_y = (
+        edge(side[kept], axis=1) for edge in (np.nanmin, np.nanmax) for side in (x, y)
+    )
+    box[kept] = np.stack([low_x - 1, low_y - 1, high_x + 2, high_y + 2], axis=1)
     low, high = np.array([-width, -height] * 2), np.array([2 * width, 2 * height] * 2)
     return np.asarray(np.floor(np.clip(box, low, high)), np.int64)
 
@@ -59,16 +74,17 @@ def layered(boxes: Ints, rows: NDArray[np.intp]) -> list[Drawing]:
         boxes: (N, 4) x0, y0, x1, y1.
         rows: (M,) those to draw.
     """
+    low, high = boxes[:, None, :2], boxes[:, None, 2:]
+    overlap = ((low < high.swapaxes(0, 1)) & (high > low.swapaxes(0, 1))).all(axis=-1)
     layers: list[list[int]] = []
+    taken: list[NDArray[np.bool_]] = []  # by layer: which boxes meet one of its members
     for row in rows.tolist():
-        x0, y0, x1, y1 = boxes[row].tolist()
-        for members in layers:
-            other = boxes[members]
-            if not ((other[:, 0] < x1) & (other[:, 2] > x0) & (other[:, 1] < y1) & (other[:, 3] > y0)).any():
-                members.append(row)
-                break
-        else:
-            layers.append([row])
+        layer = next((k for k, meets in enumerate(taken) if not meets[row]), len(layers))
+        if layer == len(layers):
+            layers.append([])
+            taken.append(np.zeros(len(boxes), bool))
+        layers[layer].append(row)
+        taken[layer] |= overlap[row]
     drawings = []
     for members in layers:
         held = boxes[members]

@@ -24,7 +24,7 @@ from sim.sensor import Sensor
 SCENARIO = "in-car-day"
 FRAMES = 24
 EVERY = 5
-PASSES = ("_shadow_pass", "_main_pass", "_sky_pass", "_halo_pass", "_read")
+PASSES = ("_shadow_pass", "_main_pass", "_contact_pass", "_sky_pass", "_halo_pass", "_read")
 AGREEMENT = 0.999
 
 
