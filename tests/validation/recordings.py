@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from scenarios.video import open_video
+from scenarios.video import Video
 from tracker import registry
 from tracker.types import Frame, Info, Intrinsics, Status
 
@@ -77,15 +77,16 @@ def evaluate(clip: str, tracker_name: str = "in-car") -> ClipResult:
     total = hits = 0
     lifetimes: dict[int, int] = {}
     on_nothing: dict[int, int] = {}
-    with open_video(RECORDINGS / clip) as video:
+    with Video(RECORDINGS / clip) as video:
         focal = FOCAL.get(clip)
         intrinsics = focal and Intrinsics(focal=focal, cx=video.width / 2, cy=video.height / 2)
         tracker.start(
             Info(width=video.width, height=video.height, rate=video.rate, intrinsics=intrinsics or None)
         )
         frames = 0
-        for tick, image in enumerate(video.frames()):
-            tracks = tracker.step(Frame(image=image, tick=tick, time=tick / video.rate))
+        for picture in video.frames():
+            tick = picture.tick
+            tracks = tracker.step(Frame(image=picture.image, tick=tick, time=picture.time))
             frames += 1
             confirmed = tracks.status == Status.CONFIRMED
             spans = [(float(b[0]), float(b[2])) for b in tracks.boxes[confirmed]]
