@@ -84,7 +84,7 @@ def layered(boxes: Ints, rows: NDArray[np.intp]) -> list[Drawing]:
             layers.append([])
             taken.append(np.zeros(len(boxes), bool))
         layers[layer].append(row)
-        taken[layer] |= overlap[row]
+        np.logical_or(taken[layer], overlap[row], out=taken[layer])
     drawings = []
     for members in layers:
         held = boxes[members]
