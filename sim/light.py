@@ -19,9 +19,9 @@ _OVERCAST_ZENITH = np.array([0.36, 0.39, 0.44])
 _OVERCAST_HORIZON = np.array([0.60, 0.63, 0.67])
 _RAIN_ZENITH = np.array([0.25, 0.27, 0.30])
 _RAIN_HORIZON = np.array([0.40, 0.43, 0.46])
-_NIGHT_ZENITH = np.array([0.0006, 0.0008, 0.0014])
-_NIGHT_HORIZON = np.array([0.0016, 0.0015, 0.0017])
-_MOON = np.array([0.0012, 0.0014, 0.0019])
+_NIGHT_ZENITH = np.array([0.00006, 0.00008, 0.00014])
+_NIGHT_HORIZON = np.array([0.00025, 0.00022, 0.00024])
+_MOON = np.array([0.0003, 0.00035, 0.0005])
 
 
 def make_light(params: LightParams, seed: int) -> Light:

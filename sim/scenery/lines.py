@@ -11,6 +11,12 @@ from sim.scenery.yard import GREY, Yard
 SEGMENT = 16.0
 """Length of a piece of rail, wall or fence as it is placed, metres."""
 
+LAMP_SPACING = 38.0
+"""Metres between lamp posts on one side."""
+
+LIT_SHARE = 0.3
+"""Share of a motorway that is lined with lamp posts."""
+
 MEDIAN_BARRIER = 2.0
 """Medians wider than this carry a barrier, metres."""
 
@@ -45,9 +51,20 @@ def _line(yard: Yard, name: str, d: float, flags: NDArray[np.bool_], *, segment:
         yard.add_at(name, float(x0 + x1) / 2, float(y0 + y1) / 2, float(np.arctan2(y1 - y0, x1 - x0)), fitted)
 
 
-def _posts(yard: Yard, name: str, d: float, every: float, *, turn: float = 0.0, first: float = 0.5) -> None:
-    """Place posts at even distances at offset ``d``."""
-    for s in np.arange(first * every, yard.road.length, every):
+def _posts(
+    yard: Yard,
+    name: str,
+    d: float,
+    every: float,
+    *,
+    turn: float = 0.0,
+    first: float = 0.5,
+    flags: NDArray[np.bool_] | None = None,
+) -> None:
+    """Place posts at even distances at offset ``d``, all of them or where ``flags`` (one a post) is set."""
+    for i, s in enumerate(np.arange(first * every, yard.road.length, every)):
+        if flags is not None and not flags[i]:
+            continue
         if yard.clear_of_road(float(s), d, float(yard.size(name)[1]) / 2):
             yard.add(name, float(s), d, turn=turn, colour=SIGNS.get(name, GREY))
 
@@ -75,14 +92,12 @@ def place_lines(yard: Yard, night: bool) -> None:
             continue
         if params.setting == "urban" or (params.setting == "motorway" and night):
             name = "lamp-post-a" if params.setting == "motorway" else "lamp-post-b"
-            _posts(
-                yard,
-                name,
-                edge + out * (yard.size(name)[1] / 2 + 0.4),
-                38.0,
-                turn=inward,
-                first=0.3 if side == "right" else 0.8,
-            )
+            # Towns are lit throughout, motorways at junctions only, on both sides at once.
+            posts = int(road.length / LAMP_SPACING) + 1
+            share = 1.0 if params.setting == "urban" else LIT_SHARE
+            lit = _stretches(yard.stream("lit"), posts, share, 9)
+            away, first = yard.size(name)[1] / 2 + 0.4, 0.3 if side == "right" else 0.8
+            _posts(yard, name, edge + out * away, LAMP_SPACING, turn=inward, first=first, flags=lit)
         if params.setting == "motorway":
             _posts(yard, "delineator", edge + out * 0.45, 50.0, turn=inward)
         elif params.setting == "rural":
