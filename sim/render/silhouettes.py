@@ -75,11 +75,11 @@ def layered(boxes: Ints, rows: NDArray[np.intp]) -> list[Drawing]:
         rows: (M,) those to draw.
     """
     low, high = boxes[:, None, :2], boxes[:, None, 2:]
-    overlap = ((low < high.swapaxes(0, 1)) & (high > low.swapaxes(0, 1))).all(axis=-1)
+    overlap = np.asarray(((low < high.swapaxes(0, 1)) & (high > low.swapaxes(0, 1))).all(axis=-1))
     layers: list[list[int]] = []
     taken: list[NDArray[np.bool_]] = []  # by layer: which boxes meet one of its members
     for row in rows.tolist():
-        layer = next((k for k, meets in enumerate(taken) if not meets[row]), len(layers))
+        layer = next((k for k, meets in enumerate(taken) if not np.asarray(meets)[row]), len(layers))
         if layer == len(layers):
             layers.append([])
             taken.append(np.zeros(len(boxes), bool))
