@@ -40,7 +40,8 @@ def _beyond(share, free):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _fit(grey, x0, y0, x1, y1, loose, body):  # type: ignore[no-untyped-def]
     """Search sides, foot and roof around a predicted box; ``loose`` is the play as a share of the width, ``body`` the
-    box of the points that move with it."""
+    box of the points that move with it.
+    """
     height, width = grey.shape
     wide, tall = x1 - x0, y1 - y0
     step = max(1, int(wide / 40))

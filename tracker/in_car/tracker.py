@@ -95,7 +95,6 @@ class InCarTracker:
             moved * (CORRELATION / np.maximum(seconds, 1e-3))[:, None],
             ratios,
             trust,
-            self._front.features.segments,
             ego,
             focal * HEIGHT / REACH,
         )

@@ -18,8 +18,8 @@ from tracker.in_car.proposals import (
     WIDEST,
     misfit,
     propose,
-    windows_from_points,
-    windows_from_segments,
+    windows_from_edges,
+    worth,
 )
 from tracker.in_car.yaw import FLOW_NOISE, HEIGHT, EgoMotion
 from tracker.types import Status
@@ -30,6 +30,10 @@ Floats = NDArray[np.float64]
 CONFIRM, REJECT = 2.5, -1.5
 # Bounds of the log odds: old evidence must not outlast new evidence for too long.
 LOWEST, HIGHEST = -6.0, 8.0
+# How much more a window must be worth than a vehicle's box to replace it.
+BETTER = 1.5
+# Least worth of a window that is begun (`tracker.in_car.proposals`).
+LEAST = 2.0
 # The nearest vehicle that is begun is this many times nearer than the farthest.
 NEAREST_SHARE = 12.0
 # Seconds over which the points' evidence is worth once itself: the span of the displacements.
@@ -52,6 +56,7 @@ class Vehicle:
     clear: float = 0.0
     log_width: float = float(np.log(USUAL))
     rate_of_scale: float = 0.0
+    better: int = 0
     rate_error: float = 10.0
 
     @property
@@ -78,7 +83,6 @@ class VehicleStore:
         moved: Floats,
         ratios: Floats,
         trust: Floats,
-        segments: Floats,
         ego: EgoMotion,
         farthest: float,
     ) -> None:
@@ -90,7 +94,6 @@ class VehicleStore:
             moved: (N, 2) displacement of each point over `CORRELATION` seconds, px.
             ratios: (N,) log likelihood ratio of each point's motion.
             trust: (N,) in [0, 1], how far the picture fixes it.
-            segments: (M, 6) horizontal segments.
             ego: The camera's own motion.
             farthest: Least height of the horizon above a contact row, px: beyond that no vehicle is begun.
         """
@@ -101,7 +104,7 @@ class VehicleStore:
             self._hold(vehicle, grey, points, horizon)
         self._end(grey, points, horizon)
         self._join(points, moved, ego.speed)
-        self._begin(grey, points, moved, segments, horizon, farthest)
+        self._begin(grey, points, moved, horizon, farthest)
 
     def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats) -> None:
         """Move the box with its points."""
@@ -197,7 +200,7 @@ class VehicleStore:
         sums = own.sum(0)
         squares = (own * own).sum(0)
         cost = misfit(float(len(own)), *sums, *squares, box[0], box[3], box[2] - box[0])
-        return float(np.clip(cost - 1.5, 0.0, 3.0))
+        return float(np.clip(0.5 * (cost - 4.0), 0.0, 3.0))
 
     def _alike(self, vehicle: Vehicle, points: PointStore) -> float:
         """Return how much the surroundings move like the vehicle itself, [0, 2]: then it is a piece of them."""
@@ -286,29 +289,33 @@ class VehicleStore:
         grey: NDArray[np.uint8],
         points: PointStore,
         moved: Floats,
-        segments: Floats,
         horizon: float,
         farthest: float,
     ) -> None:
-        free = (points.owner == 0) & (points.age >= 4)
-        likely = free & (points.evidence > 1.0)
+        ripe = points.age >= 4
+        likely = ripe & (points.evidence > 1.0) & (points.position[:, 1] > horizon + 2.0)
         if likely.sum() < 2:
             return
         position = points.position
-        windows = np.concatenate(
-            [
-                windows_from_points(position[likely, 0], position[likely, 1], horizon),
-                windows_from_segments(segments, horizon),
-            ]
+        windows, clear = windows_from_edges(
+            grey, position[likely], horizon, NEAREST_SHARE * farthest, farthest
         )
-        contact = windows[:, 3] - horizon
-        windows = windows[
-            (contact >= farthest) & (contact <= NEAREST_SHARE * farthest) & (windows[:, 3] < len(grey))
-        ]
-        for window in propose(
-            windows, position[free], moved[free], points.evidence[free], horizon, least=4.0
-        ):
-            self._try(window, grey, points, free, horizon, farthest)
+        known = ripe & (np.abs(points.evidence) > 0.8)
+        seen = position[known], moved[known], points.evidence[known], horizon
+        for window, value in zip(*propose(windows, clear, *seen, least=LEAST, most=12), strict=True):
+            shared = [_covered(window, one.box) for one in self.vehicles]
+            if not shared or max(shared) < 0.3:
+                self._try(window, grey, points, ripe & (points.owner == 0), horizon, farthest)
+                continue
+            # A better outline of a vehicle that is tracked already.
+            rival = self.vehicles[int(np.argmax(shared))]
+            if value > BETTER * max(worth(rival.box, grey, *seen), 0.0):
+                rival.better += 1
+                if rival.better >= 3:
+                    rival.box, rival.better = window.copy(), 0
+                    rival.log_width = float(np.log((window[2] - window[0]) / (window[3] - horizon)))
+            else:
+                rival.better = 0
 
     def _try(
         self,
@@ -321,7 +328,7 @@ class VehicleStore:
     ) -> None:
         inside = _inside(points.position, window, 0.05) & free & (points.evidence > 0.5)
         body = _body(points.position[inside], window)
-        found = fit_extent(grey, window, loose=0.3, body=body)
+        found = fit_extent(grey, window, loose=0.12, body=body)
         box = found.box
         wide, contact = box[2] - box[0], box[3] - horizon
         if contact < farthest or not SLIMMEST * contact < wide < WIDEST * contact:
