@@ -15,7 +15,8 @@ from tracker.types import Diagnostics, Frame, Info, Intrinsics, Odometry, Status
 class Tracker(Protocol):
     """Takes the frames of one episode in order and returns the tracks of each.
 
-    A tracker without boxes (paper 1's printed rules label traces only) sets ``has_boxes = False`` on its class
+    A tracker without boxes (paper 1's printed rules label traces only) sets ``has_boxes = False`` on its
+    class
     and returns `Tracks.none()`; its box scores are null.
     """
 
@@ -42,8 +43,10 @@ class ContractError(ValueError):
 def check_tracker(tracker: object, *, frames: int = 8) -> None:
     """Run the contract of a tracker on small made-up episodes.
 
-    The pictures are noise with moving bright blocks in them: whether a tracker finds these does not matter, what it returns
-    does. A tracker that needs more than it is promised (`tracker.types.Info`, `tracker.types.Frame`) fails here.
+    The pictures are noise with moving bright blocks in them: whether a tracker finds these does not matter,
+    what it returns
+    does. A tracker that needs more than it is promised (`tracker.types.Info`, `tracker.types.Frame`) fails
+    here.
 
     Args:
         tracker: What a user brings.

@@ -28,7 +28,10 @@ STAGES = {
 
 
 def drive(frames: int, seed: int = 0) -> list[NDArray[np.uint8]]:
-    """Draw a plain drive: a road of random grain that flows, scenery, and three cars ahead; (H, W, 3) each."""
+    """Draw a plain drive: a road of random grain that flows, scenery, and three cars ahead.
+
+    (H, W, 3) each.
+    """
     rng = np.random.default_rng(seed)
     grain = cv2.GaussianBlur(rng.integers(70, 130, (4096, 512), np.uint8), (0, 0), 1.2)
     posts = np.stack([rng.choice([-7.0, 7.0], 60), rng.uniform(5, 500, 60)], 1)

@@ -30,7 +30,9 @@ def constant_velocity(step: float, intensity: float, axes: int = 1) -> tuple[Flo
 
 def predict(mean: Floats, covariance: Floats, transition: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Advance N states (N, n) and covariances (N, n, n) by one step."""
-    return mean @ transition.T, transition @ covariance @ transition.T + noise
+    moved: Floats = mean @ transition.T
+    spread: Floats = transition @ covariance @ transition.T + noise
+    return moved, spread
 
 
 def update(

@@ -1,8 +1,11 @@
 """How much a point's motion speaks for a vehicle that goes the ego's way: log likelihood ratios.
 
-What is static and seen y px below the horizon lies on the ground or above it, so it is at most ``f H / y`` away and expands
-at least at ``e = g y``. A vehicle that drives along expands at ``u / Z`` with u the small closing speed. An oncoming one expands
-faster than the ground, so it counts with the scenery here. This is p(x, v | B) and p(x, v | C) of paper 1 with the row of
+What is static and seen y px below the horizon lies on the ground or above it, so it is at most ``f H / y``
+away and expands
+at least at ``e = g y``. A vehicle that drives along expands at ``u / Z`` with u the small closing speed. An
+oncoming one expands
+faster than the ground, so it counts with the scenery here. This is p(x, v | B) and p(x, v | C) of paper 1
+with the row of
 the point put in place of the unknown depth, and both axes of the flow in place of one.
 """
 
@@ -18,11 +21,13 @@ from tracker.in_car.yaw import FLOW_NOISE, HEIGHT
 
 Floats = NDArray[np.float64]
 
-# Vehicle: standard deviation of the closing speed as a share of the ego's and beside it (m/s), and sideways (m/s).
+# Vehicle: standard deviation of the closing speed as a share of the ego's and beside it (m/s), and sideways
+# (m/s).
 CLOSING_SHARE, CLOSING, SIDEWAYS = 0.13, 1.5, 0.8
 # Ego speed below which standing still speaks less and less against a vehicle, m/s.
 WALK = 3.0
-# Static: share of points on the ground itself; those above it follow an exponential in e / (g y) - 1 with this mean.
+# Static: share of points on the ground itself; those above it follow an exponential in e / (g y) - 1 with
+# this mean.
 ON_GROUND, ABOVE = 0.45, 1.0
 # Least and greatest distance of what stands at or above the horizon, metres.
 NEAR, FAR = 6.0, 1000.0
@@ -120,7 +125,10 @@ def motion_evidence(
     yaw_rate: float,
     horizon_error: float = 2.5,
 ) -> Floats:
-    """Return `log_ratios` of points at (N, 2) from the focus of expansion that moved by (N, 2) in (N,) seconds."""
+    """Return `log_ratios` of points at (N, 2) from the focus of expansion that moved by (N.
+
+    2) in (N,) seconds.
+    """
     middle = relative - 0.5 * moved
     speed = ground * focal * HEIGHT
     ratios: Floats = log_ratios(
@@ -136,5 +144,6 @@ def motion_evidence(
         2.0 * FLOW_NOISE,
         horizon_error,
     )
-    # While the ego stands, vehicles in a queue stand like everything else; what moves is no scenery even then.
+    # While the ego stands, vehicles in a queue stand like everything else; what moves is no scenery
+    # even then.
     return np.where(ratios < 0.0, ratios * min(1.0, speed / WALK), ratios)

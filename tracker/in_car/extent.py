@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# Height over width of a vehicle's rear: a car's usual value and its spread; taller ones (vans, lorries) cost this much.
+# Height over width of a vehicle's rear: a car's usual value and its spread; taller ones (vans, lorries)
+# cost this much.
 ASPECT, ASPECT_SPREAD, TALL = 0.82, 0.16, 1.2
 # Greatest height over width.
 TALLEST = 1.65
@@ -39,8 +40,9 @@ def _beyond(share, free):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _fit(grey, x0, y0, x1, y1, loose, body):  # type: ignore[no-untyped-def]
-    """Search sides, foot and roof around a predicted box; ``loose`` is the play as a share of the width, ``body`` the
-    box of the points that move with it.
+    """Search sides, foot and roof around a predicted box.
+
+    ``loose`` is the play as a share of the width, ``body`` the box of the points that move with the vehicle.
     """
     height, width = grey.shape
     wide, tall = x1 - x0, y1 - y0

@@ -58,7 +58,7 @@ def working_picture(image: NDArray[np.uint8]) -> Picture:
     if scale > 1.0:
         size = (round(width / scale), round(height / scale))
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-    grey = np.asarray(cv2.transform(image, np.array([[0.45, 0.40, 0.15]])), np.uint8).reshape(image.shape[:2])
+    grey = np.asarray(cv2.transform(image, np.array([[0.45, 0.40, 0.15]])), np.uint8)
     return Picture(grey=grey, scale=width / grey.shape[1], brightness=float(cv2.mean(grey)[0]))
 
 
@@ -107,7 +107,8 @@ def find_lamps(grey: NDArray[np.uint8], night: float, *, contrast: float = 30.0,
 
     Args:
         grey: (H, W).
-        night: How dark it is, [0, 1]; at 0 there are no lamps, and the less night, the more contrast is asked for.
+        night: How dark it is, [0, 1]; at 0 there are no lamps, and the less night, the more contrast is
+            asked for.
         contrast: Grey levels above the mean of the surroundings, at full night.
         limit: Peaks returned at most.
 
@@ -198,7 +199,8 @@ def _stiffness(grey, x, y, ux, uy, radius):  # type: ignore[no-untyped-def]
 def stiffness(grey: NDArray[np.uint8], position: Floats, direction: Floats, radius: int = 5) -> Floats:
     """Tell how well the picture around a point fixes its motion along a direction.
 
-    Along an edge that points at the focus of expansion a point seems to stand still like a car, whatever it does.
+    Along an edge that points at the focus of expansion a point seems to stand still like a car, whatever it
+    does.
 
     Args:
         grey: (H, W).

@@ -11,7 +11,8 @@ from tracker.in_car.features import Features, Picture, find_features, working_pi
 from tracker.in_car.traces import TraceSet, TraceStore
 from tracker.types import Frame, Info
 
-# Where the focal length is not given: a horizontal field of view of about 44 degrees, common among dash cameras.
+# Where the focal length is not given: a horizontal field of view of about 44 degrees, common among dash
+# cameras.
 FOCAL_PER_WIDTH = 1.25
 MIN_HITS = 4
 

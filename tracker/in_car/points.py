@@ -101,7 +101,10 @@ class PointStore:
         self._last = grey
 
     def remember(self, turned: Floats) -> None:
-        """Store the positions of this frame, with the flow that the camera's rotation caused since the last one (N, 2)."""
+        """Store the positions of this frame.
+
+        With the flow that the camera's rotation caused since the last one (N, 2).
+        """
         total = self._turned[:, -1] + turned
         self._past = np.roll(self._past, -1, axis=1)
         self._turned = np.roll(self._turned, -1, axis=1)
@@ -109,7 +112,10 @@ class PointStore:
         self._turned[:, -1] = total
 
     def displacement(self) -> tuple[Floats, Floats]:
-        """Return how far each point moved over its remembered past, rotation removed (N, 2), and in how many frames (N,)."""
+        """Return how far each point moved over its remembered past, rotation removed (N, 2).
+
+        And in how many frames (N,).
+        """
         span = np.minimum(self.age, self._memory - 1)
         rows = np.arange(len(self))
         then = self._memory - 1 - span
@@ -123,7 +129,10 @@ class PointStore:
         return np.asarray((moved < play) & (self.age >= 4))
 
     def refill(self, grey: NDArray[np.uint8], horizon: float) -> None:
-        """Add corners where there are none: sparsely above the horizon, densely where far vehicles lie, then the road."""
+        """Add corners where there are none.
+
+        Sparsely above the horizon, densely where far vehicles lie, then the road.
+        """
         height, width = grey.shape
         top = int(np.clip(horizon - 0.13 * width, 0, height - 24))
         near = int(np.clip(horizon - 0.025 * width, top + 8, height - 16))

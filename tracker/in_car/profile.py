@@ -1,7 +1,9 @@
-"""Vertical condensing: features of a frame summed down the columns into one-dimensional profiles (paper 1, section III).
+"""Vertical condensing: a frame's features summed down the columns into profiles (paper 1, section III).
 
-The paper merges whatever stands above one x. Here the segments are first gathered into clusters that agree in x and lie close
-together in y, so that a pole before a far car, or two cars in line, keep centres of their own; the profile stays what
+The paper merges whatever stands above one x. Here the segments are first gathered into clusters that agree
+in x and lie close
+together in y, so that a pole before a far car, or two cars in line, keep centres of their own; the profile
+stays what
 decides whether a centre is strong enough to be one.
 """
 
@@ -51,7 +53,8 @@ class Centres:
 def band_rows(horizon: float, height: int, width: int) -> tuple[int, int]:
     """Return the rows [top, bottom) in which vehicles show, by p(x, y | C) (`tracker.in_car.occurrence`).
 
-    From the roof of a lorry at mid-range above the horizon down to the ground some five metres ahead; in units of the
+    From the roof of a lorry at mid-range above the horizon down to the ground some five metres ahead; in
+    units of the
     picture's width, since the focal length scales with it.
     """
     top = int(np.clip(horizon - 0.12 * width, 0, height - 16))
@@ -78,16 +81,14 @@ def condense(spans: Floats, weights: Floats, width: int) -> Profile:
 
 def smooth(profile: Profile, sigma: float) -> Profile:
     """Smooth a profile with a Gaussian, px."""
-    return np.asarray(
-        cv2.GaussianBlur(profile[None], (0, 0), sigma, borderType=cv2.BORDER_REPLICATE), np.float32
-    )[0]
+    rows = cv2.GaussianBlur(profile[None], (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(rows, np.float32).reshape(-1)
 
 
 def intensity(picture: Picture, top: int, bottom: int) -> Profile:
     """Return the mean intensity of every column over rows [top, bottom): (W,)."""
-    return np.asarray(cv2.reduce(picture.grey[top:bottom], 0, cv2.REDUCE_AVG, dtype=cv2.CV_32F), np.float32)[
-        0
-    ]
+    mean = cv2.reduce(picture.grey[top:bottom], 0, cv2.REDUCE_AVG, dtype=cv2.CV_32F)
+    return np.asarray(mean, np.float32).reshape(-1)
 
 
 @njit(cache=True)
@@ -119,7 +120,7 @@ def _cluster(x0, x1, y):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def local_maxima(profile, least, radius):  # type: ignore[no-untyped-def]
-    """Return the columns where a profile is at least ``least`` and highest within ``radius``; the first of a plateau."""
+    """Return the columns where a profile is at least ``least`` and highest within ``radius``."""
     places = np.empty(profile.size, np.int64)
     used = 0
     for column in range(profile.size):
@@ -154,12 +155,14 @@ def find_centres(
         features: Of the frame.
         segment_profile: (W,) smoothed profile of the segments.
         horizon: Row of the horizon, px.
-        longest: Segments longer than this many times their height below the horizon (and 40 px) are wider than any
+        longest: Segments longer than this many times their height below the horizon (and 40 px) are wider
+            than any
             vehicle that stands there: kerbs, bridges, shadows across the road. They make no centre.
         share: A maximum of the profile counts above this share of the profile's mean over the picture.
         reach: A cluster belongs to a maximum this near, px.
         layers: Clusters kept above one maximum: the strongest ones.
-        stack: A cluster of so many segments, one above the other, counts without a maximum of the whole profile: what
+        stack: A cluster of so many segments, one above the other, counts without a maximum of the whole
+            profile: what
             else stands in its columns may drown it.
 
     Returns:
@@ -196,7 +199,7 @@ def find_centres(
 
 
 def _strongest(
-    middle: Floats, weight: Floats, peaks: NDArray[np.int64], reach: float, layers: int
+    middle: Floats, weight: Floats, peaks: NDArray[np.signedinteger], reach: float, layers: int
 ) -> NDArray[np.bool_]:
     """Choose the heaviest clusters at each maximum of the profile."""
     chosen = np.zeros(len(middle), bool)

@@ -1,4 +1,4 @@
-"""Where a vehicle may be that is not tracked yet: windows of a vehicle's size, filled with points that move like one."""
+"""Where a vehicle may be: windows of a vehicle's size, filled with points that move like one."""
 
 from __future__ import annotations
 
@@ -14,18 +14,22 @@ Floats = NDArray[np.float64]
 SLIMMEST, USUAL, WIDEST = 0.85, 1.55, 2.6
 
 
-# Room that a point takes on a vehicle up to so wide (px), px^2 a point: a window much larger than its points' room is none.
+# Room that a point takes on a vehicle up to so wide (px), px^2 a point: a window much larger than its
+# points' room is none.
 # Wider vehicles have no more points: they are near, where the grid of corners is coarse.
 ROOM, ROOM_WIDTH = 200.0, 60.0
 
 
-# How far around a window its cut-off parts are looked for, as a share of its width: less than the gap between two lanes.
+# How far around a window its cut-off parts are looked for, as a share of its width: less than the gap
+# between two lanes.
 CUT = 0.5
-# Log odds beyond which more points add nothing: how well they fill a window is to decide, not how many they are.
+# Log odds beyond which more points add nothing: how well they fill a window is to decide, not how many they
+# are.
 ENOUGH = 60.0
 # How far the points of one body may move apart over the remembered time: px, and as a share of its width.
 BODY_PLAY, BODY_SHARE = 1.0, 0.02
-# Where the points of a vehicle lie in its window, as shares of its width: their mean above the ground, with its play, and
+# Where the points of a vehicle lie in its window, as shares of its width: their mean above the ground, with
+# its play, and
 # their spreads in x and y, which for a filled rear are those of a uniform density.
 MEAN_HEIGHT, MEAN_PLAY, SPREAD_X, SPREAD_Y = 0.38, 0.13, 0.27, 0.16
 
@@ -115,7 +119,10 @@ WIDTHS = (0.65, 1.5)
 
 @njit(cache=True)
 def _edge_windows(grey, x, y, horizon, rows, ratios, limit):  # type: ignore[no-untyped-def]
-    """Pair vertical edges a vehicle's width apart, at each contact row, where there is a likely point between them."""
+    """Pair vertical edges a vehicle's width apart, at each contact row.
+
+    Where there is a likely point between them.
+    """
     height, width = grey.shape
     windows = np.empty((limit, 4))
     clear = np.empty(limit)

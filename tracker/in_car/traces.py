@@ -1,4 +1,4 @@
-"""Traces of feature centres in the (x, t) plane: association, filtering, slope, pruning (paper 1, section III)."""
+"""Traces of feature centres in the (x, t) plane: association, slope, pruning (paper 1, section III)."""
 
 from __future__ import annotations
 
@@ -141,7 +141,8 @@ class TraceStore:
         apart_x = self.mean[:, 0, :1] - centres.x[None]
         apart_y = self.mean[:, 1, :1] - centres.y[None]
         spread_x = np.minimum(self._covariance[:, 0, 0, :1], 9.0) + NOISE_X**2
-        # Which segments of an object are found changes from frame to frame: its row is less sure than its middle.
+        # Which segments of an object are found changes from frame to frame: its row is less sure
+        # than its middle.
         spread_y = np.minimum(self._covariance[:, 1, 0, :1], 9.0) + NOISE_Y**2 + (0.08 * size) ** 2
         ratio = np.log(np.maximum(centres.width[None], 1.0) / np.maximum(self.width[:, None], 1.0))
         cost = apart_x**2 / spread_x + apart_y**2 / spread_y + (ratio / 0.35) ** 2

@@ -1,8 +1,11 @@
 """The in-car tracker: paper 1's idea with its limits mended (registry name ``in-car``).
 
-Traces come from the shared front end. What they are is decided by more than (x, v): the camera's rotation is estimated and
-removed, points on and around a trace are followed in both axes, and their motion is weighed against what a static thing
-at that row must do (`tracker.in_car.evidence`); the evidence is accumulated over time. Points that move as one body
+Traces come from the shared front end. What they are is decided by more than (x, v): the camera's rotation
+is estimated and
+removed, points on and around a trace are followed in both axes, and their motion is weighed against what a
+static thing
+at that row must do (`tracker.in_car.evidence`); the evidence is accumulated over time. Points that move as
+one body
 and fill a vehicle's outline become a vehicle with a box; its traces belong to it.
 """
 
@@ -24,7 +27,8 @@ Floats = NDArray[np.float64]
 
 # Greatest distance at which a vehicle is begun, metres.
 REACH = 75.0
-# Rows below the horizon, as a share of the width, from which on a point that stands still in the picture is no vehicle's.
+# Rows below the horizon, as a share of the width, from which on a point that stands still in the picture is
+# no vehicle's.
 NEAR_ROWS = 0.11
 # Frames that a point must have been followed before its motion says anything.
 RIPE = 4
@@ -74,7 +78,8 @@ class InCarTracker:
         direction = relative / np.maximum(np.hypot(relative[:, 0], relative[:, 1]), 1.0)[:, None]
         trust = np.clip((stiffness(grey, points.position, direction) - 0.05) / 0.15, 0.0, 1.0)
         ripe = points.age >= RIPE
-        # So near, no vehicle keeps its place to a fraction of a pixel: the bonnet does, and dirt, and writing in the picture.
+        # So near, no vehicle keeps its place to a fraction of a pixel: the bonnet does, and dirt,
+        # and writing in the picture.
         painted = points.frozen() & (relative[:, 1] > NEAR_ROWS * grey.shape[1])
         still = ripe & ~painted & (points.evidence < 2.0) & (points.owner == 0)
         speed = frame.odometry.speed if frame.odometry else None
@@ -160,7 +165,10 @@ class InCarTracker:
         )
 
     def _nearby_evidence(self, traces: TraceSet, scale: float) -> Floats:
-        """Return (N,) the mean log odds, in [-2, 2], of the points around each trace; 0 where there are none."""
+        """Return (N,) the mean log odds, in [-2, 2], of the points around each trace.
+
+        0 where there are none.
+        """
         points = self._points
         ripe = points.age >= RIPE
         position, evidence = points.position[ripe] * scale, np.clip(points.evidence[ripe], -2.0, 2.0)
@@ -173,7 +181,10 @@ class InCarTracker:
 
 
 def _owners(traces: TraceSet, tracks: Tracks) -> NDArray[np.int64]:
-    """Return (N,) the id of the track in whose box a trace lies, 0 for none; of several the one whose middle is nearest."""
+    """Return (N,) the id of the track in whose box a trace lies, 0 for none.
+
+    Of several the one whose middle is nearest.
+    """
     owners = np.zeros(len(traces), np.int64)
     if not len(tracks) or not len(traces):
         return owners

@@ -1,4 +1,7 @@
-"""The vehicles that are tracked: a box each, carried along by the points on it and held by the picture's edges."""
+"""The vehicles that are tracked.
+
+A box each, carried along by the points on it and held by the picture's edges.
+"""
 
 from __future__ import annotations
 
@@ -157,7 +160,10 @@ class VehicleStore:
         vehicle.rate_error = float(noise * np.sqrt(gain))
 
     def _divergence(self, vehicle: Vehicle, contact: float, ego: EgoMotion) -> float:
-        """Return the log likelihood ratio of a vehicle's growth: what is static grows by g times its height of horizon."""
+        """Return the log likelihood ratio of a vehicle's growth.
+
+        What is static grows by g times its height of horizon.
+        """
         least = ego.ground * contact
         if vehicle.members < 3 or vehicle.age < 0.3 * self._rate:
             return 0.0
@@ -192,7 +198,10 @@ class VehicleStore:
             vehicle.confirmed = True
 
     def _ill_filled(self, vehicle: Vehicle, points: PointStore) -> float:
-        """Return how badly the vehicle's points fill its box, [0, 2]: a box that drifted off is to be found anew."""
+        """Return how badly the vehicle's points fill its box, [0, 2].
+
+        A box that drifted off is to be found anew.
+        """
         own = points.position[points.owner == vehicle.id]
         if len(own) < 3:
             return 0.0
@@ -203,7 +212,10 @@ class VehicleStore:
         return float(np.clip(0.5 * (cost - 4.0), 0.0, 3.0))
 
     def _alike(self, vehicle: Vehicle, points: PointStore) -> float:
-        """Return how much the surroundings move like the vehicle itself, [0, 2]: then it is a piece of them."""
+        """Return how much the surroundings move like the vehicle itself, [0, 2].
+
+        Then it is a piece of them.
+        """
         box = vehicle.box
         wide, tall = box[2] - box[0], box[3] - box[1]
         x, y = points.position.T
@@ -352,7 +364,10 @@ class VehicleStore:
 
 
 def _body(position: Floats, box: Floats) -> Floats:
-    """Return the box of a vehicle's points (N, 2), or what is most likely of its own where they are too few."""
+    """Return the box of a vehicle's points (N, 2).
+
+    Or what is most likely of its own where they are too few.
+    """
     if len(position) >= 3:
         return np.concatenate([np.quantile(position, 0.1, axis=0), np.quantile(position, 0.9, axis=0)])
     wide = box[2] - box[0]

@@ -1,9 +1,13 @@
 """The camera's own motion from the flow of all points: yaw and pitch rate, focus of expansion, speed over ground.
 
-A static point moves by ``e (p - foe)`` away from the focus of expansion, ``e = V / Z``, plus what the rotation adds:
-``-k(x) R_y`` along x and a like term along y for the pitch (methods.md 1.2). The rotation and the focus follow from the
-direction of the flow alone (the epipolar constraint), whatever the depths are, and vehicles that keep their lane obey it too. The
-ground then gives the speed: a point of the road y px below the horizon expands at ``e = g y`` with ``g = V / (f H)``.
+A static point moves by ``e (p - foe)`` away from the focus of expansion, ``e = V / Z``, plus what the
+rotation adds:
+``-k(x) R_y`` along x and a like term along y for the pitch (methods.md 1.2). The rotation and the focus
+follow from the
+direction of the flow alone (the epipolar constraint), whatever the depths are, and vehicles that keep their
+lane obey it too. The
+ground then gives the speed: a point of the road y px below the horizon expands at ``e = g y`` with ``g = V
+/ (f H)``.
 """
 
 from __future__ import annotations
@@ -24,7 +28,8 @@ HEIGHT = 1.25
 def _rotation(x, y, dx, dy, weight, focal, guess_a, guess_b, sigma_a, sigma_b, noise):  # type: ignore[no-untyped-def]
     """Robust least squares for the rotation's shifts a (x) and b (y) of the middle of the picture, px a frame.
 
-    Residual of a static point: ((dx + a kx) y - (dy - b ky) x) / r with kx = 1 + x^2/f^2, ky = 1 + y^2/f^2; mixed terms
+    Residual of a static point: ((dx + a kx) y - (dy - b ky) x) / r with kx = 1 + x^2/f^2, ky = 1 + y^2/f^2;
+    mixed terms
     x y / f^2 included. Cauchy weights, six rounds.
     """
     a, b = guess_a, guess_b
@@ -55,7 +60,10 @@ def _rotation(x, y, dx, dy, weight, focal, guess_a, guess_b, sigma_a, sigma_b, n
 
 @njit(cache=True)
 def _mode(ratio, spread, weight, prior, prior_spread):  # type: ignore[no-untyped-def]
-    """Return where weighted kernels of their own spread pile up highest under a Gaussian prior, and the support there."""
+    """Return where weighted kernels of their own spread pile up highest under a Gaussian prior.
+
+    And the support there.
+    """
     best, place, support = -1.0, prior, 0.0
     for i in range(ratio.size + 1):
         candidate = prior if i == ratio.size else ratio[i]
@@ -138,7 +146,8 @@ class EgoMotion:
             3.0,
             FLOW_NOISE,
         )
-        # A car does not pitch one way for long: a lasting mean comes from a focus that is off, and is left to move it.
+        # A car does not pitch one way for long: a lasting mean comes from a focus that is off, and
+        # is left to move it.
         self._drift += min(1.0, 0.5 / self._rate) * (b - self._drift)
         b -= self._drift
         self.shift = np.array([-a, b])
@@ -185,7 +194,8 @@ class EgoMotion:
         use = (weight > 0) & (size > 1.5)
         if use.sum() < 6:
             return
-        # The line through a point along its flow passes through the focus: n . focus = n . p, n the flow's normal.
+        # The line through a point along its flow passes through the focus: n . focus = n . p, n the
+        # flow's normal.
         normal = np.stack([-moved[use, 1], moved[use, 0]], 1) / size[use, None]
         offset = (normal * middle[use]).sum(1)
         distance = np.maximum(np.hypot(*(middle[use] - self.focus).T), 5.0)
@@ -220,8 +230,10 @@ class EgoMotion:
         prior, loose = self.ground, self._ground_spread * self.ground + 2e-3
         if speed is not None and self._calibrated > 0.3:
             prior, loose = speed * self._per_speed, 0.15 * speed * self._per_speed + 3e-4
-        # What stands still in the picture may be a vehicle, the bonnet, dirt on the glass or an edge that hides its own
-        # motion; what expands like the ground can only be the ground. So few expanding points outvote many still ones.
+        # What stands still in the picture may be a vehicle, the bonnet, dirt on the glass or an
+        # edge that hides its own
+        # motion; what expands like the ground can only be the ground. So few expanding points
+        # outvote many still ones.
         expanding = ratio > np.maximum(3.0 * error[use] / below[use, 1], 0.3 * self.ground)
         if value[expanding].sum() > 0.15 * value[~expanding].sum():
             ratio, spread, value = ratio[expanding], spread[expanding], value[expanding]
