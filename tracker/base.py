@@ -101,7 +101,7 @@ def _run(tracker: Tracker, info: Info, frames: list[Frame], broken: list[str]) -
     for frame in frames:
         before = frame.image.copy()
         try:
-            tracks = tracker.step(frame)
+            tracks: object = tracker.step(frame)
         except Exception as error:
             broken.append(f"step: raises {type(error).__name__}: {error}")
             return results

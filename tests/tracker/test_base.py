@@ -15,10 +15,10 @@ from tracker.types import Frame, Info, Tracks
 class Fixed:
     """Returns one track, and keeps the contract; the broken ones below change one thing."""
 
-    def start(self, info: Info) -> None:
+    def start(self, _info: Info) -> None:
         self.count = 0
 
-    def step(self, frame: Frame) -> Tracks:
+    def step(self, _frame: Frame) -> Tracks:
         self.count += 1
         return Tracks(
             ids=np.array([1], np.int64),
@@ -53,7 +53,7 @@ class Short(Fixed):
 
 
 class Twice(Fixed):
-    def step(self, frame):
+    def step(self, _frame):
         return Tracks(
             ids=np.ones(2, np.int64), boxes=np.tile([0.0, 0.0, 1.0, 1.0], (2, 1)), status=np.ones(2, np.uint8)
         )
@@ -91,12 +91,12 @@ class Rewriter(Fixed):
 
 
 class Listing(Fixed):
-    def step(self, frame):
+    def step(self, _frame):
         return [1]
 
 
 class Raising(Fixed):
-    def step(self, frame):
+    def step(self, _frame):
         raise RuntimeError("no scenario given")
 
 

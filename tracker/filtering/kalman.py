@@ -25,7 +25,7 @@ def constant_velocity(step: float, intensity: float, axes: int = 1) -> tuple[Flo
     transition = np.array([[1.0, step], [0.0, 1.0]])
     noise = intensity * np.array([[step**3 / 3, step**2 / 2], [step**2 / 2, step]])
     eye = np.eye(axes)
-    return np.kron(eye, transition), np.kron(eye, noise)
+    return np.asarray(np.kron(eye, transition), np.float64), np.asarray(np.kron(eye, noise), np.float64)
 
 
 def predict(mean: Floats, covariance: Floats, transition: Floats, noise: Floats) -> tuple[Floats, Floats]:

@@ -181,7 +181,9 @@ def find_centres(
     middle = np.bincount(group, length * 0.5 * (x0 + x1), count) / divisor
     row = np.bincount(group, length * y, count) / divisor
     wide = np.bincount(group, length * length, count) / divisor
-    peaks = local_maxima(segment_profile, share * float(segment_profile.mean()), round(SMOOTHING))
+    peaks: NDArray[np.int64] = local_maxima(
+        segment_profile, share * float(segment_profile.mean()), round(SMOOTHING)
+    )
     strong = _strongest(middle, weight, peaks, reach, layers) | (np.bincount(group, minlength=count) >= stack)
     renumber = np.cumsum(strong) - 1
     member = strong[group]
@@ -199,7 +201,7 @@ def find_centres(
 
 
 def _strongest(
-    middle: Floats, weight: Floats, peaks: NDArray[np.signedinteger], reach: float, layers: int
+    middle: Floats, weight: Floats, peaks: NDArray[np.int64], reach: float, layers: int
 ) -> NDArray[np.bool_]:
     """Choose the heaviest clusters at each maximum of the profile."""
     chosen = np.zeros(len(middle), bool)

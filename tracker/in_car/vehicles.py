@@ -369,7 +369,8 @@ def _body(position: Floats, box: Floats) -> Floats:
     Or what is most likely of its own where they are too few.
     """
     if len(position) >= 3:
-        return np.concatenate([np.quantile(position, 0.1, axis=0), np.quantile(position, 0.9, axis=0)])
+        inner: Floats = np.quantile(position, (0.1, 0.9), axis=0)
+        return inner.ravel()
     wide = box[2] - box[0]
     return box + np.array([0.1, 0.15, -0.1, -0.15]) * wide
 

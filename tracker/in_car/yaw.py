@@ -1,4 +1,4 @@
-"""The camera's own motion from the flow of all points: yaw and pitch rate, focus of expansion, speed over ground.
+"""The camera's own motion from the flow of all points: rotation, focus of expansion, speed.
 
 A static point moves by ``e (p - foe)`` away from the focus of expansion, ``e = V / Z``, plus what the
 rotation adds:
@@ -25,7 +25,9 @@ HEIGHT = 1.25
 
 
 @njit(cache=True)
-def _rotation(x, y, dx, dy, weight, focal, guess_a, guess_b, sigma_a, sigma_b, noise):  # type: ignore[no-untyped-def]
+def _rotation(  # type: ignore[no-untyped-def]
+    x, y, dx, dy, weight, focal, guess_a, guess_b, sigma_a, sigma_b, noise
+):
     """Robust least squares for the rotation's shifts a (x) and b (y) of the middle of the picture, px a frame.
 
     Residual of a static point: ((dx + a kx) y - (dy - b ky) x) / r with kx = 1 + x^2/f^2, ky = 1 + y^2/f^2;
