@@ -184,7 +184,9 @@ def find_centres(
     peaks: NDArray[np.int64] = local_maxima(
         segment_profile, share * float(segment_profile.mean()), round(SMOOTHING)
     )
-    strong = _strongest(middle, weight, peaks, reach, layers) | (np.bincount(group, minlength=count) >= stack)
+    strong = _strongest(middle, np.asarray(weight, np.float64), peaks, reach, layers) | (
+        np.bincount(group, minlength=count) >= stack
+    )
     renumber = np.cumsum(strong) - 1
     member = strong[group]
     lamps = features.lamps

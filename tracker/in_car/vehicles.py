@@ -370,9 +370,9 @@ def _body(position: Floats, box: Floats) -> Floats:
     """
     if len(position) >= 3:
         inner: Floats = np.quantile(position, (0.1, 0.9), axis=0)
-        return inner.ravel()
+        return np.asarray(inner.reshape(-1), np.float64)
     wide = box[2] - box[0]
-    return box + np.array([0.1, 0.15, -0.1, -0.15]) * wide
+    return np.asarray(box + np.array([0.1, 0.15, -0.1, -0.15]) * wide)
 
 
 def _inside(position: Floats, box: Floats, play: float) -> NDArray[np.bool_]:

@@ -28,7 +28,7 @@ HEIGHT = 1.25
 def _rotation(  # type: ignore[no-untyped-def]
     x, y, dx, dy, weight, focal, guess_a, guess_b, sigma_a, sigma_b, noise
 ):
-    """Robust least squares for the rotation's shifts a (x) and b (y) of the middle of the picture, px a frame.
+    """Robust least squares for the rotation's shifts a (x) and b (y) of the picture's middle, px a frame.
 
     Residual of a static point: ((dx + a kx) y - (dy - b ky) x) / r with kx = 1 + x^2/f^2, ky = 1 + y^2/f^2;
     mixed terms
