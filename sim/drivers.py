@@ -193,6 +193,10 @@ class Driver(QuickVehicle):
     """
 
     LANE_CHANGE_SECONDS = 4.5
+    ROOM_SECONDS = 0.5
+    """Least time gap before and behind, between bumpers, to change into."""
+    LANE_CHANGE_MAX_BRAKING = 1.0
+    """M/s^2 that a driver accepts to brake after a change of lane."""
     MOVING = 4.0
     """M/s: below this the lateral control slackens, so that creeping cars do not swerve."""
 
@@ -209,6 +213,15 @@ class Driver(QuickVehicle):
         self._aim = self.target_lane_index
         self._blend = _Blend(0.0, 0.0, self.LANE_CHANGE_SECONDS)
         self._since = math.inf
+        self._left = self._aim[2]
+
+    @property
+    def lanes(self) -> tuple[int, ...]:
+        """Numbers of the lanes that it is on or aims at: who changes lanes is on the old one to the end."""
+        near = {self.lane_index[2]: None, self.target_lane_index[2]: None}
+        if self._since < self.LANE_CHANGE_SECONDS:
+            near[self._left] = None
+        return tuple(near)
 
     def resize(self, length: float, width: float) -> None:
         """Set the footprint, metres."""
@@ -229,6 +242,7 @@ class Driver(QuickVehicle):
             drift = self.speed * math.sin(self.heading - lane.heading_at(along))
             self._blend = _Blend(across, drift, self.LANE_CHANGE_SECONDS)
             self._since = 0.0
+            self._left = self._aim[2]
         self._aim = target_lane_index
         wanted, rate = self._blend.at(self._since)
         wanted, rate = wanted + self.weave[0], rate + self.weave[1]
@@ -239,6 +253,41 @@ class Driver(QuickVehicle):
         slip = math.asin(_clip(self.LENGTH / 2 * turn, -0.5, 0.5))
         heading_ref = lane.heading_at(later) + math.asin(_clip(sideways / speed, -0.25, 0.25)) - slip
         return self.steer(self.KP_HEADING * wrap_to_pi(heading_ref - self.heading))
+
+    def change_lane_policy(self) -> None:
+        """Decide now and then whether to change lanes; a change that has begun is finished."""
+        if self.lane_index == self.target_lane_index and self._since >= self.LANE_CHANGE_SECONDS:
+            super().change_lane_policy()
+
+    def mobil(self, lane_index: LaneIndex) -> bool:
+        """Whether a change of lane pays (MOBIL), and leaves room enough to all who are concerned."""
+        front, rear = self.road.neighbour_vehicles(self, lane_index)
+        if rear and not self._room(rear, self, rear.acceleration(rear, self)):
+            return False
+        if front and not self._room(self, front, self.acceleration(self, front)):
+            return False
+        return not self._contested(lane_index) and bool(super().mobil(lane_index))
+
+    def _room(self, follower: Any, leader: Any, acceleration: float) -> bool:
+        between = (follower.LENGTH + leader.LENGTH) / 2
+        gap = follower.lane_distance_to(leader) - between
+        return bool(
+            acceleration > -self.LANE_CHANGE_MAX_BRAKING
+            and gap > self.jam_gap + self.ROOM_SECONDS * follower.speed
+        )
+
+    def _contested(self, lane_index: LaneIndex) -> bool:
+        """Whether somebody near is changing into a lane already; few are at any time."""
+        for other in self.road.vehicles:
+            if other.target_lane_index[2] != lane_index[2] or other.lane_index[2] == lane_index[2]:
+                continue
+            if other is self or other.direction.dot(self.direction) < 0:
+                continue
+            reach = (self.LENGTH + other.LENGTH) / 2 + self.jam_gap
+            reach += self.TIME_WANTED * max(self.speed, other.speed)
+            if abs(self.lane_distance_to(other)) < reach:
+                return True
+        return False
 
     def acceleration(
         self,

@@ -294,11 +294,13 @@ class Population:
         self._spacing.pop((same_way, ahead, lane), None)
 
     def _ends(self) -> dict[tuple[bool, int], tuple[Actor, Actor]]:
-        """The nearest and the farthest vehicle along s of each lane; who changes lanes is on both."""
+        """The nearest and the farthest vehicle along s of each lane; who changes lanes is on both.
+
+        So nobody enters beside a vehicle that has yet to clear the lane.
+        """
         ends: dict[tuple[bool, int], tuple[Actor, Actor]] = {}
         for actor in self.actors:
-            lanes = {actor.driver.lane_index[2]: None, actor.driver.target_lane_index[2]: None}
-            for lane in lanes:
+            for lane in actor.driver.lanes:
                 nearest, farthest = ends.get((actor.same_way, lane), (actor, actor))
                 ends[actor.same_way, lane] = (
                     actor if actor.s < nearest.s else nearest,
