@@ -17,6 +17,32 @@ _LONGEST = 14
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _walk(
+    luma: NDArray[np.uint8],
+    i: int,
+    j: int,
+    oi: int,
+    oj: int,
+    di: int,
+    dj: int,
+    middle: float,
+    limit: float,
+    longest: int,
+) -> tuple[int, float]:
+    """Follow an edge one way: return how many pixels it goes on, and how the brightness differs at its end."""
+    rows, columns = luma.shape
+    end = 0.0
+    for length in range(1, longest + 1):
+        i, j, oi, oj = i + di, j + dj, oi + di, oj + dj
+        if i < 0 or j < 0 or i >= rows or j >= columns:
+            return length, end
+        end = 0.5 * (int(luma[i, j]) + int(luma[oi, oj])) - middle
+        if abs(end) >= limit:
+            return length, end
+    return longest + 1, end
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _smooth(
     image: NDArray[np.uint8],
     luma: NDArray[np.uint8],
@@ -44,29 +70,16 @@ def _smooth(
         oi, oj = i + side * di, j + side * dj
         middle = 0.5 * (m + int(luma[oi, oj]))
         ai, aj = (0, 1) if level else (1, 0)
-        reach = [0, 0]
-        ends = [0.0, 0.0]
-        for k in range(2):
-            sign = 1 if k else -1
-            length = 1
-            end = 0.0
-            while length <= longest:
-                pi, pj = i + sign * length * ai, j + sign * length * aj
-                qi, qj = oi + sign * length * ai, oj + sign * length * aj
-                if pi < 0 or pj < 0 or pi >= rows or pj >= columns:
-                    break
-                end = 0.5 * (int(luma[pi, pj]) + int(luma[qi, qj])) - middle
-                if abs(end) >= 0.25 * step:
-                    break
-                length += 1
-            reach[k] = length
-            ends[k] = end
-        nearer = 0 if reach[0] < reach[1] else 1
+        before_length, before_end = _walk(luma, i, j, oi, oj, -ai, -aj, middle, 0.25 * step, longest)
+        after_length, after_end = _walk(luma, i, j, oi, oj, ai, aj, middle, 0.25 * step, longest)
+        near_length, near_end = before_length, before_end
+        if after_length <= before_length:
+            near_length, near_end = after_length, after_end
         shift = 0.0
         # Only the side on which the edge bends away from this pixel lies on the wrong side of the true edge,
         # and an edge without an end in reach is level.
-        if abs(ends[nearer]) >= 0.25 * step and (ends[nearer] < 0) != (m < middle):
-            shift = 0.5 - (reach[nearer] - 0.5) / max(reach[0] + reach[1] - 1, 1)
+        if abs(near_end) >= 0.25 * step and (near_end < 0) != (m < middle):
+            shift = 0.5 - (near_length - 0.5) / max(before_length + after_length - 1, 1)
         # What differs from all around is thinner than a pixel; straight edges stay below a third.
         around = (2 * (n + s + w + e) + nw + ne + sw + se) / 12.0
         lone = min(max(abs(around - m) / contrast - 0.35, 0.0) / 0.65, 1.0)
