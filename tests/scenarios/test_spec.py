@@ -77,7 +77,7 @@ def test_the_schema_describes_the_file():
         (["sensor.noise=3\nseconds=1"], ["wanted key=value"]),
         (["ego.lane=2"], ["ego.lane is 2", "road.lanes, 2"]),
         (["road.min_radius=600"], ["road.max_radius, 500"]),
-        (["traffic.vans=0.9"], ["wanted at most 1"]),
+        (["traffic.vans=0.95"], ["wanted at most 1"]),
     ],
 )
 def test_wrong_overrides_are_refused_in_one_line(overrides, parts):
