@@ -75,9 +75,9 @@ def test_the_schema_describes_the_file():
         (["=3"], ["wanted key=value"]),
         (["sensor.noise=3 4"], ["no TOML value"]),
         (["sensor.noise=3\nseconds=1"], ["wanted key=value"]),
-        (["ego.lane=2"], ["ego.lane is 2", "road.lanes, 2"]),
+        (["ego.lane=3"], ["ego.lane is 3", "road.lanes, 3"]),
         (["road.min_radius=600"], ["road.max_radius, 500"]),
-        (["traffic.vans=0.95"], ["wanted at most 1"]),
+        (["traffic.vans=0.9"], ["wanted at most 1"]),
     ],
 )
 def test_wrong_overrides_are_refused_in_one_line(overrides, parts):
