@@ -71,6 +71,7 @@ def make_light(params: LightParams, seed: int) -> Light:
         night=params.time == "night",
         wet=min(1.0, 1.4 * params.rain),
         seed=clouds,
+        street_lamps=params.street_lamps,
     )
 
 

@@ -33,11 +33,13 @@ class Lights:
         position: (LIGHTS, 3) relative to the camera, metres.
         colour: (LIGHTS, 3) irradiance at one metre.
         aim: (LIGHTS, 4) direction of the beam, and the power of its cosine.
+        count: How many there are, the strongest first.
     """
 
     position: NDArray[np.float32]
     colour: NDArray[np.float32]
     aim: NDArray[np.float32]
+    count: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,12 +125,13 @@ def lights(burning: Burning) -> Lights:
     worth = burning.strength / (distance + 5.0) ** 2
     rows = np.argsort(-worth, kind="stable")[:LIGHTS]
     rows = rows[distance[rows] < _REACH]
+    count = len(rows)
     out = Lights(
+        count=count,
         position=np.zeros((LIGHTS, 3), np.float32),
         colour=np.zeros((LIGHTS, 3), np.float32),
         aim=np.zeros((LIGHTS, 4), np.float32),
     )
-    count = len(rows)
     out.position[:count] = burning.position[rows]
     out.colour[:count] = burning.colour[rows] * burning.strength[rows, None]
     out.aim[:count, :3] = burning.direction[rows]
