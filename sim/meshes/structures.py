@@ -56,7 +56,7 @@ def structure_models() -> tuple[Model, ...]:
         Model(name="bridge-b", kind=Kind.BRIDGE, size=(6.0, 60.0, 7.0), lods=(_bridge((6.0, 60.0, 7.0)),)),
     )
     woods = tuple(
-        Model(name=f"woods-{letter}", kind=Kind.TREE, size=WOODS, lods=_woods(letter), switch=(220.0,))
+        Model(name=f"woods-{letter}", kind=Kind.TREE, size=WOODS, lods=_woods(letter), switch=(110.0, 260.0))
         for letter in "abc"
     )
     hills = tuple(
@@ -183,65 +183,69 @@ def _bridge(size: tuple[float, float, float]) -> Mesh:
     return scaled_to(builder, size)
 
 
-def _woods(letter: str) -> tuple[Mesh, Mesh]:
-    """Make a strip of distant wood along x, fine and coarse: round crowns, lower toward the ends."""
+def _woods(letter: str) -> tuple[Mesh, ...]:
+    """Make a strip of distant wood along x, from fine to coarse: round crowns, lower toward the ends."""
+    rng = stream(_SEED, "woods", letter)
+    crowns = 17
+    foot = np.linspace(-60, 60, crowns + 1)
+    middles = (foot[1:] + foot[:-1]) / 2
+    heights = (9.0 + 4.0 * rng.uniform(-1, 1, crowns)) * np.clip(1.15 - (np.abs(middles) / 62) ** 4, 0.4, 1)
+    reach = rng.uniform(0.75, 1.0, crowns)
     meshes = []
-    for columns in (4, 2):
-        rng = stream(_SEED, "woods", letter)
-        crowns = 17
-        foot = np.linspace(-60, 60, crowns + 1)
-        heights = (9.0 + 4.0 * rng.uniform(-1, 1, crowns)) * np.clip(
-            1.15 - (np.abs(foot[:-1] + 3.5) / 62) ** 4, 0.4, 1
-        )
-        reach = rng.uniform(0.75, 1.0, crowns)
+    for columns, leaves in ((2, 110), (2, 0), (1, 0)):
         bend = np.linspace(0, np.pi, columns, endpoint=False) + np.pi / (2 * columns)
         x = (foot[:-1, None] + (foot[1:] - foot[:-1])[:, None] * (0.5 - 0.5 * np.cos(bend))).ravel()
         tops = (heights[:, None] * (0.68 + 0.32 * np.sin(bend))).ravel()
-        tops *= stream(_SEED, "woods", letter, "twigs").uniform(0.93, 1.07, 4 * crowns)[:: 4 // columns]
+        tops *= stream(_SEED, "woods", letter, "twigs").uniform(0.93, 1.07, 2 * crowns)[:: 2 // columns]
         depth = np.repeat(reach, columns)
         flat = np.zeros(len(x))
         builder = MeshBuilder()
         for side in (1, -1):
-            rows = [
-                (flat + side * 6.0 * depth, flat),
-                (side * 5.0 * depth, 0.62 * tops),
-                (side * 1.5 * depth, tops),
-            ]
-            rows += [(flat, 0.8 * tops)]
-            if columns < 4:
+            rows = [(flat + side * 6.0 * depth, flat), (flat + side * 4.6 * depth, 0.66 * tops), (flat, tops)]
+            if not leaves:
                 del rows[1]
             lattice = np.stack([np.stack([x, y, z], axis=1) for y, z in rows])
-            fluff = rng.normal(0, 0.45, lattice.shape) + np.array([0.0, 0.8 * side, 0.45])
+            fluff = rng.normal(0, 0.35, lattice.shape) + np.array([0.0, 0.8 * side, 0.45])
             fluff /= np.linalg.norm(fluff, axis=2, keepdims=True)
-            patch = [
-                (slice(None, -1), slice(None, -1)),
-                (slice(1, None), slice(None, -1)),
-                (slice(1, None), slice(1, None)),
+            cuts = [
+                (slice(i, i - 1 or None), slice(j, j - 1 or None))
+                for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))
             ]
-            patch += [(slice(None, -1), slice(1, None))]
             quads, shades = (
-                np.stack([a[cut] for cut in patch], axis=2).reshape(-1, 4, 3) for a in (lattice, fluff)
+                np.stack([a[cut] for cut in cuts], axis=2).reshape(-1, 4, 3) for a in (lattice, fluff)
             )
             facing = np.broadcast_to(np.array([0, side, 0.6]), (len(quads), 3))
             builder.polygons(quads, Surface.FOLIAGE, facing=facing, normals=shades)
+        if leaves:
+            # Twigs along the crest and on both flanks break the outline.
+            twigs = stream(_SEED, "woods", letter, "leaves")
+            place = twigs.integers(0, len(x), leaves)
+            flank, up = twigs.choice([-1.0, 1.0], leaves), twigs.uniform(0.5, 1.0, leaves)
+            at = np.stack([x[place], flank * 8.5 * (1.05 - up) * depth[place], up * tops[place]], axis=1)
+            at[:, 0] = np.clip(at[:, 0] + twigs.uniform(-2, 2, leaves), -59, 59)
+            rings = at[:, None] + twigs.normal(0, 0.75, (leaves, 3, 3))
+            normals = np.repeat(
+                np.stack([0 * flank, 0.8 * flank, 0.6 + 0 * flank], axis=1)[:, None], 3, axis=1
+            )
+            builder.polygons(rings, Surface.FOLIAGE, facing=normals[:, 0], normals=normals)
         meshes.append(scaled_to(builder, WOODS))
-    return meshes[0], meshes[1]
+    return tuple(meshes)
 
 
 def _hill(letter: str) -> Mesh:
     """Make a ridge along x with a wavy crest."""
     rng = stream(_SEED, "hills", letter)
     builder = MeshBuilder()
-    count = 33
+    count = 25
     x = np.linspace(-450, 450, count)
     envelope = np.clip(1 - (x / 450) ** 2, 0, 1)
     crest = 26 * np.sqrt(envelope)
-    for octave in (1, 2, 3, 5, 8, 13):
+    for octave in (1, 2, 3, 5, 8):
         crest += 15 / octave * np.sin(x / 900 * 2 * np.pi * octave + rng.uniform(0, 2 * np.pi)) * envelope
     crest = np.clip(crest + 4, 0.0, None) * np.clip(1 - (x / 450) ** 4, 0, 1)
-    rows = []
-    for y, share in ((-130, 0.0), (-70, 0.55), (0, 1.0), (70, 0.55), (130, 0.0)):
-        wobble = rng.uniform(0.8, 1.2, count) if share < 1 else 1.0
-        rows.append(np.stack([x, np.full(count, float(y)), crest * share * wobble], axis=1))
+    rows = [
+        np.stack([x, np.full(count, y), crest * share], axis=1)
+        for y, share in ((-130.0, 0.0), (0.0, 1.0), (130.0, 0.0))
+    ]
     builder.grid(np.stack(rows), Surface.HILL, inside=(0, 0, -400))
     return scaled_to(builder, (900.0, 260.0, 60.0))
