@@ -28,7 +28,7 @@ _ROOM = 8192  # instances and draws in a frame
 
 _SHADOW_REACH = 120.0  # metres within which bodies cast shadows
 _SHADOW_WIDEN = 2.5  # half-widths of the frame within which they do
-_BEAM = 60.0
+_BEAM = 44.0
 _BODY_LIGHTS = 4  # lamps that light bodies, of those that light the ground
 # Share of the body's colour (2: by the texture's alpha), reflection, more by the alpha, retro-reflection.
 _GLOSS = {

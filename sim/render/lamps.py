@@ -95,11 +95,11 @@ class LampPlan:
             forward = np.array([cos, sin, 0.0])
             shown = []
             if lamps & Lamps.BRAKE:
-                shown.append((self._tail[model], -forward, _BRAKE, 1.0, 4.0))
+                shown.append((self._tail[model], -forward, _BRAKE, 1.0, 7.0))
             elif lamps & Lamps.TAIL:
-                shown.append((self._tail[model], -forward, _TAIL, 1.0, 4.0))
+                shown.append((self._tail[model], -forward, _TAIL, 1.0, 7.0))
             if lamps & Lamps.HEAD:
-                shown.append((self._head[model], np.array([cos, sin, -0.05]), _HEAD, 28.0, 60.0))
+                shown.append((self._head[model], np.array([cos, sin, -0.05]), _HEAD, 28.0, 14.0))
             if streets:
                 shown.append((self._street[model], np.array([0.0, 0.0, -1.0]), _STREET, 2.0, 90.0))
             for places, aim, tint, sharpness, reach in shown:

@@ -59,7 +59,7 @@ void main() {
 #ifdef NIGHT
     vec2 place = gl_FragCoord.xy / u_frame;
     vec4 pool = textureLod(u_pool, place, 0.0);
-    light += pool.rgb + pool.a * vec3(1.0, 0.93, 0.8) * (1.0 + 3.0 * road_mark);
+    light += pool.rgb + pool.a * vec3(1.0, 0.86, 0.68) * (1.0 + 7.0 * road_mark);
 #endif
     vec3 colour = albedo * light;
     // A wet road is darker and mirrors at grazing angles; water gathers in the wheel tracks.

@@ -16,7 +16,7 @@ float own_beam(vec3 at, vec3 normal) {
     float aside = from.x / max(from.z, 0.1), up = from.y / max(from.z, 0.1);
     float cut = -0.012 + 0.03 * clamp(aside * 4.0, 0.0, 1.0);
     float below = 1.0 - smoothstep(cut - 0.012, cut + 0.012, up);
-    float spread = exp(min(up - cut, 0.0) * 55.0 - aside * aside * 7.0);
+    float spread = exp(min(up - cut, 0.0) * 34.0 - aside * aside * 7.0);
     float lobe = spread * mix(0.045, 1.0, below) * step(0.0, from.z);
     float facing = max(-dot(normal, at) / length(at), 0.0);
     return u_beam * lobe * facing / (reach * reach);
