@@ -119,8 +119,8 @@ def test_triangle_budgets(model: Model):
         assert counts[2] <= 45 or model.kind is not Kind.CAR
     elif model.kind in (Kind.TREE, Kind.BUSH) and not model.name.startswith("woods"):
         assert counts[0] <= 800
-        assert counts[1] <= 380
-        assert counts[2] <= 100
+        assert counts[1] <= 400
+        assert counts[2] <= 110
     elif model.kind is Kind.HILL:
         assert counts[0] <= 100
     else:
