@@ -95,9 +95,9 @@ class LampPlan:
             forward = np.array([cos, sin, 0.0])
             shown = []
             if lamps & Lamps.BRAKE:
-                shown.append((self._tail[model], -forward, _BRAKE, 1.0, 7.0))
+                shown.append((self._tail[model], -forward, _BRAKE, 1.0, 6.0))
             elif lamps & Lamps.TAIL:
-                shown.append((self._tail[model], -forward, _TAIL, 1.0, 7.0))
+                shown.append((self._tail[model], -forward, _TAIL, 1.0, 5.0))
             if lamps & Lamps.HEAD:
                 shown.append((self._head[model], np.array([cos, sin, -0.05]), _HEAD, 28.0, 14.0))
             if streets:
