@@ -67,6 +67,11 @@ class InCarScene:
             light=make_light(params.light, seed),
         )
 
+    @property
+    def collided(self) -> bool:
+        """Whether vehicles have touched each other: the drive is then invalid."""
+        return self._traffic.collided
+
     def step(self, action: NDArray[np.float32] | None = None) -> WorldState:
         """Advance one tick; the first call gives tick 0.
 
