@@ -77,6 +77,7 @@ class Traffic:
         self._population = Population(road, params, self._fleet, self._pace, seed=seed)
         warm_up = round(WARM_UP * rate)
         self._tick = -warm_up
+        self._collided = False
         self._profile = ego_car.Profile(ego, stream(seed, "ego", "profile"))
         self._surge = Surge.draw(
             stream(seed, "ego", "surge"),
@@ -95,8 +96,8 @@ class Traffic:
 
     @property
     def collided(self) -> bool:
-        """Whether any vehicle has touched another: the drive is then invalid."""
-        return any(v.crashed for v in self._population.world.vehicles)
+        """Whether any vehicle has ever touched another: the drive is then invalid."""
+        return self._collided
 
     def step(self, action: NDArray[np.floating[Any]] | None = None) -> None:
         """Advance one tick.
@@ -111,6 +112,7 @@ class Traffic:
         self._set_speeds()
         self._population.world.act()
         self._population.world.step(dt)
+        self._collided |= any(v.crashed for v in self._population.world.vehicles)
         self._tick += 1
         self._population.time = self._tick / self._rate
         self._population.track()

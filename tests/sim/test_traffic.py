@@ -264,6 +264,51 @@ def test_twenty_seeds_drive_without_collision(case):
     assert np.mean([drive_without_collision(case, seed)[0] for seed in range(20)]) > 0.8
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_nobody_stands_in_another_at_the_start(seed):
+    params = TrafficParams(density=45.0, speed=8.0, stop_and_go=True, lorries=0.4, buses=0.2)
+    road = build_road(RoadParams(lanes=3), 900.0, stream(seed, "road"))
+    assert not Traffic(road, params, EgoParams(speed=8.0), CATALOGUE, seed=seed, rate=6).collided
+
+
+def test_who_changes_lanes_is_on_the_old_one_until_it_is_cleared():
+    road = build_road(RoadParams(), 900.0, stream(0, "road"))
+    world = IndexedRoad(road.network)
+    driver = Driver(world, road.network.get_lane(("f0", "f1", 1)).position(50.0, 0), speed=20.0)
+    driver.enable_lane_change = False
+    world.vehicles.append(driver)
+    assert driver.lanes == (1,)
+    driver.target_lane_index = ("f0", "f1", 0)
+    beside = 0
+    for _ in range(5 * RATE):
+        world.act()
+        world.step(1 / RATE)
+        across = abs(road.network.get_lane(("f0", "f1", 1)).local_coordinates(driver.position)[1])
+        if across < 3.5:
+            assert sorted(driver.lanes) == [0, 1]
+            beside += driver.lane_index[2] == 0  # as highway-env sees it, it is over already
+    assert beside > RATE
+    assert driver.lanes == (0,)
+
+
+def test_who_is_cut_in_on_falls_back_calmly():
+    road = build_road(RoadParams(), 900.0, stream(0, "road"))
+    world = IndexedRoad(road.network)
+    lane = road.network.get_lane(("f0", "f1", 1))
+    for s, speed in ((62.0, 20.0), (50.0, 21.0)):  # seven metres between bumpers
+        driver = Driver(world, lane.position(s, 0), speed=speed, target_speed=speed)
+        driver.COMFORT_ACC_MAX, driver.COMFORT_ACC_MIN, driver.enable_lane_change = 1.6, -2.0, False
+        world.vehicles.append(driver)
+    hardest = 0.0
+    for _ in range(10 * RATE):
+        world.act()
+        hardest = min(hardest, world.vehicles[1].action["acceleration"])
+        world.step(1 / RATE)
+    assert -3.0 < hardest < -1.0
+    assert world.vehicles[1].lane_distance_to(world.vehicles[0]) > 25.0
+    assert not world.vehicles[1].crashed
+
+
 def test_stop_and_go_stops_and_goes():
     run = traffic("stop-and-go", 0, rate=10)
     speeds, braking = [], False
