@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sim.camera import Camera, Pose
-from sim.render.instances import COMMAND, Library, Selection
+from sim.render.instances import Library, Selection
 from sim.render.types import Silhouettes
 from sim.render.view import view_matrices
 from sim.world import Bodies
@@ -193,14 +193,14 @@ class SilhouettePass:
         if not jobs:
             return _counted(vehicles.ids[selection.rows], within, beyond, {})
         order = np.concatenate([drawing.rows for *_, drawing in jobs])
-        commands, spans = _commands(library, selection.meshes, [drawing.rows for *_, drawing in jobs])
         self._instances.write(instances[order])
-        self._commands.write(commands)
+        self._commands.write(library.single_commands(selection.meshes[order]))
+        first = 0
         masks: dict[int, Mask] = {}
         ctx.enable_only(ctx.CULL_FACE)
         ctx.front_face = "cw"
         current = None
-        for (target, view, held, drawing), (first, draws) in zip(jobs, spans, strict=True):
+        for target, view, held, drawing in jobs:
             if target is not current:
                 target.use()
                 shader["u_clip"].write(view_matrices(view, pose)["u_clip"])
@@ -209,7 +209,8 @@ class SilhouettePass:
             area = (x0, y0, x1 - x0, y1 - y0)
             target.clear(viewport=area)
             ctx.scissor = area
-            self._array.render_indirect(self._commands, count=draws, first=first)
+            self._array.render_indirect(self._commands, count=len(drawing.rows), first=first)
+            first += len(drawing.rows)
             ctx.scissor = None
             raw = target.read(viewport=area, components=1, dtype="u2", alignment=1)
             picture = np.frombuffer(raw, np.uint16).reshape(y1 - y0, x1 - x0)
@@ -225,21 +226,6 @@ class SilhouettePass:
                     masks[row] = (b, a, picture[b - y0 : d - y0, a - x0 : c - x0] == row + 1)
         beyond[:, 1:] -= shift[[0, 1, 0, 1]]
         return _counted(vehicles.ids[selection.rows], within, beyond, masks)
-
-
-def _commands(
-    library: Library, meshes: NDArray[np.int32], drawings: list[NDArray[np.intp]]
-) -> tuple[NDArray[np.void], list[tuple[int, int]]]:
-    """Return the commands of all drawings, and of each drawing the first and how many."""
-    parts, spans, base, first = [], [], 0, 0
-    for rows in drawings:
-        part = library.commands(meshes[rows])
-        part["base_instance"] += base
-        parts.append(part)
-        spans.append((first, len(part)))
-        base += len(rows)
-        first += len(part)
-    return np.concatenate(parts).astype(COMMAND), spans
 
 
 def _counted(ids: NDArray[np.uint32], within: Ints, beyond: Ints, masks: dict[int, Mask]) -> Silhouettes:
