@@ -51,6 +51,22 @@ def structure_models() -> tuple[Model, ...]:
             ("hall", (38.4, 22.4, 8.0)),
         )
     )
+    blocks += tuple(
+        Model(
+            name=name,
+            kind=Kind.BUILDING,
+            size=size,
+            lods=(make(size, True), make(size, False)),
+            switch=(90.0,),
+        )
+        for name, size, make in (
+            ("flats-a", (22.4, 12.8, 13.4), _flats),
+            ("flats-b", (16.0, 12.8, 19.8), _flats),
+            ("shops-a", (19.2, 12.8, 10.6), _shops),
+            ("shops-b", (12.8, 12.8, 13.8), _shops),
+            ("offices", (22.4, 16.0, 20.0), _offices),
+        )
+    )
     bridges = (
         Model(name="bridge-a", kind=Kind.BRIDGE, size=(10.0, 60.0, 7.4), lods=(_bridge((10.0, 60.0, 7.4)),)),
         Model(name="bridge-b", kind=Kind.BRIDGE, size=(6.0, 60.0, 7.0), lods=(_bridge((6.0, 60.0, 7.0)),)),
@@ -137,6 +153,90 @@ def _block(size: tuple[float, float, float], detail: bool) -> Mesh:
             (half_x + 0.12, half_y + 0.12, FLOOR + 0.25),
             Surface.CONCRETE,
         )
+    return scaled_to(builder, size)
+
+
+def _flats(size: tuple[float, float, float], detail: bool) -> Mesh:
+    """Make flats with balconies on the sides along x, in every second bay."""
+    length, width, height = size
+    builder = MeshBuilder()
+    half_x, half_y = length / 2 - 0.2, width / 2 - 1.2
+    _walls(builder, half_x, half_y, height - 0.6)
+    builder.box(
+        (-half_x - 0.2, -half_y - 0.5, height - 0.7), (half_x + 0.2, half_y + 0.5, height), Surface.CONCRETE
+    )
+    for side in (1, -1):
+        near, far = side * half_y, side * (width / 2)
+        for x in np.arange(-half_x + 0.4, half_x - 3.0, 2 * FLOOR):
+            if not detail:
+                # From afar a row of balconies is one pale band up the wall.
+                band = (x, min(near, far), FLOOR), (x + 0.9 * FLOOR, max(near, far), height - 1.6)
+                builder.box(*band, Surface.FACADE)
+                continue
+            for z in np.arange(FLOOR, height - 2.4, FLOOR):
+                low, high = (x, min(near, far)), (x + 0.9 * FLOOR, max(near, far))
+                builder.box(
+                    (*low, z), (*high, z + 0.18), Surface.CONCRETE, without="-y" if side > 0 else "+y"
+                )
+                front = sorted((far, far - side * 0.06))
+                builder.box(
+                    (low[0], front[0], z + 0.18), (high[0], front[1], z + 1.1), Surface.CARGO, without="-z"
+                )
+    return scaled_to(builder, size)
+
+
+def _shops(size: tuple[float, float, float], detail: bool) -> Mesh:
+    """Make shops below flats: panes from wall to wall under a board and awnings, on the sides along x."""
+    length, width, height = size
+    builder = MeshBuilder()
+    half_x, half_y = length / 2 - 0.2, width / 2 - 1.0
+    _walls(builder, half_x, half_y, height - 0.5)
+    builder.box(
+        (-half_x - 0.2, -half_y - 0.3, height - 0.5), (half_x + 0.2, half_y + 0.3, height), Surface.ROOF
+    )
+    for side in (1, -1):
+        face, facing = side * (half_y + 0.05), (0, side, 0)
+        quad = [(-half_x, face, 0.0), (half_x, face, 0.0), (half_x, face, FLOOR), (-half_x, face, FLOOR)]
+        builder.polygon(quad, Surface.PLASTIC, facing=facing)
+        board = [(-half_x, face, 2.7), (half_x, face, 2.7), (half_x, face, 3.4), (-half_x, face, 3.4)]
+        builder.polygon(np.array(board) + np.array([0, side * 0.06, 0]), Surface.PAINT, facing=facing)
+        count = max(2, round(length / 4.8))
+        for i in range(count):
+            x0, x1 = (-half_x + 2 * half_x * (i + share) / count for share in (0.06, 0.94))
+            pane = np.array([(x0, face, 0.5), (x1, face, 0.5), (x1, face, 2.6), (x0, face, 2.6)])
+            builder.polygon(pane + np.array([0, side * 0.03, 0]), Surface.GLASS, facing=facing)
+            if detail and i % 2 == 0:
+                out = side * (width / 2)
+                awning = [(x0, face, 2.75), (x1, face, 2.75), (x1, out, 2.35), (x0, out, 2.35)]
+                for up in (1, -1):
+                    builder.polygon(awning, Surface.CARGO, facing=(0, 0.3 * side * up, up))
+    return scaled_to(builder, size)
+
+
+def _offices(size: tuple[float, float, float], detail: bool) -> Mesh:
+    """Make offices: bands of glass between bands of concrete, and a plant room on the roof."""
+    length, width, height = size
+    builder = MeshBuilder()
+    half_x, half_y = length / 2, width / 2
+    top = height - 2.2
+    builder.box(
+        (-half_x + 0.1, -half_y + 0.1, 0), (half_x - 0.1, half_y - 0.1, top), Surface.GLASS, without="-z"
+    )
+    for z in np.arange(FLOOR - 0.9, top, FLOOR):
+        band = (-half_x, -half_y, z), (half_x, half_y, min(z + 1.2, top + 0.3))
+        builder.box(*band, Surface.CARGO, without="" if detail else "-z+z")
+    builder.box((-half_x, -half_y, top), (half_x, half_y, top + 0.4), Surface.CARGO, without="-z")
+    if detail:
+        for x in np.linspace(-half_x + 0.15, half_x - 0.15, 8):
+            for side in (1, -1):
+                y = sorted((side * (half_y - 0.2), side * (half_y + 0.0)))
+                builder.box((x - 0.12, y[0], 0), (x + 0.12, y[1], top), Surface.CARGO, without="-z+z")
+    builder.box(
+        (-0.3 * length, -0.25 * width, top + 0.4),
+        (0.1 * length, 0.25 * width, height),
+        Surface.STEEL,
+        without="-z",
+    )
     return scaled_to(builder, size)
 
 

@@ -73,7 +73,7 @@ MODELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "bush": ("bush-a", "bush-b", "bush-c"),
         "sign": ("sign-motorway", "sign-direction", "sign-speed", "sign-diamond"),
         "pole": ("pole-a", "delineator"),
-        "building": ("hall", "barn", "house-b"),
+        "building": ("hall", "barn", "house-b", "offices"),
     },
     "rural": {
         "tree": ("broadleaf-a", "broadleaf-b", "broadleaf-c", "broadleaf-e", "broadleaf-d", "conifer-a"),
@@ -87,7 +87,20 @@ MODELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "bush": ("bush-a", "bush-c"),
         "sign": ("sign-direction", "sign-speed", "sign-warning", "sign-diamond"),
         "pole": ("pole-b", "delineator"),
-        "building": ("block-a", "block-b", "block-c", "house-a", "house-b", "house-c"),
+        "building": (
+            "shops-a",
+            "flats-a",
+            "block-a",
+            "house-a",
+            "shops-b",
+            "offices",
+            "block-b",
+            "house-c",
+            "flats-b",
+            "shops-a",
+            "block-c",
+            "house-b",
+        ),
     },
 }
 
