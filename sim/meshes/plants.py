@@ -241,13 +241,13 @@ def _broadleaf(
             (centre, extent * (1 if i == 0 else swell))
             for i, (centre, extent) in enumerate(blobs[:: 2 if detail else 5])
         ]
-    leaves = (36, 270, 540)[detail]
+    leaves = (16, 250, 540)[detail]
     crown(
         builder,
         blobs,
         stream(_SEED, "plants", name, "leaves"),
         leaves=leaves,
-        leaf=(0.15, 0.070, 0.056)[detail] * (0.3 * width + 0.7 * (0.5 * width * width * deep) ** (1 / 3)),
+        leaf=(0.17, 0.070, 0.056)[detail] * (0.3 * width + 0.7 * (0.5 * width * width * deep) ** (1 / 3)),
     )
     return scaled_to(builder, size)
 
