@@ -1,4 +1,4 @@
-"""The pools of light that lamps throw on the ground at night, at a quarter of the frame's resolution.
+"""The pools of light that lamps throw on the ground at night, at a sixth of the frame's resolution.
 
 They are smooth, and a loop over all lamps for every pixel would cost more than all the rest of the picture.
 """
@@ -13,7 +13,7 @@ from sim.camera import Camera, Pose
 from sim.render.programs import program, set_uniforms
 from sim.render.view import look_matrix
 
-_COARSER = 4
+_COARSER = 6
 
 
 class PoolPass:

@@ -84,6 +84,11 @@ def main() -> None:
     ratios = [b / a for a, b in zip(times["GlRenderer.render"], times["PbrRenderer.render"], strict=True)]
     print(f"{'ratio, pyrender / GL':24s} {statistics.median(ratios):7.2f}")
     print(f"{'equal ids':24s} {min(equal):7.5f}")
+    print(
+        "GlRenderer: shadows on, ids and depth in the same pass, edges smoothed after drawing (one sample a "
+        "pixel).\nPbrRenderer: shadows on, ids in a second pass, edges by four samples a pixel, "
+        "which is better and dearer."
+    )
 
 
 if __name__ == "__main__":
