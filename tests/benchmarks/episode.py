@@ -14,7 +14,9 @@ from sim.simulation import Simulation
 from tracker import registry
 
 
-def drive(scenario_name: str, frames: int, seconds: float, report_every: int | None = None) -> dict[str, float]:
+def drive(
+    scenario_name: str, frames: int, seconds: float, report_every: int | None = None
+) -> dict[str, float]:
     """Simulate and track; return the median milliseconds a frame by stage, and the frames a second."""
     scenario = spec.load(scenario_name, ())
     scene = InCarScene(scenario.in_car, seed=0, rate=scenario.rate, seconds=seconds)
@@ -47,7 +49,9 @@ def main(argv: list[str] | None = None) -> None:
     arguments = parser.parse_args(argv or [])
     drive("in-car-day", 30, 20.0)  # compiles
     result = drive("in-car-day", 300, 20.0)
-    print("  ".join(f"{stage} {value:.1f}" for stage, value in result.items()), "(ms a frame; fps of the loop)")
+    print(
+        "  ".join(f"{stage} {value:.1f}" for stage, value in result.items()), "(ms a frame; fps of the loop)"
+    )
     print(f"peak memory {peak_rss_mb():.0f} MB")
     if arguments.long:
         drive("in-car-day", 18000, 600.0, report_every=1800)

@@ -1,9 +1,9 @@
 """The in-car tracker on real recordings, against labels made by eye.
 
-``python -m tests.validation.recordings`` prints, clip by clip, how many of the labelled same-way cars are covered
-and which tracks stand on nothing. Labels (labels/in_car.json) are x intervals every 25 frames. Names that begin
-with "far:" are vehicles lower than 12 px at 640 px width, or mostly out of view: they need not be covered, and a
-track on one is not false.
+``python -m tests.validation.recordings`` prints, clip by clip, how many of the labelled same-way cars
+are covered and which tracks stand on nothing. Labels (labels/in_car.json) are x intervals every 25
+frames. Names that begin with "far:" are vehicles lower than 12 px at 640 px width, or mostly out of
+view: they need not be covered, and a track on one is not false.
 """
 
 from __future__ import annotations
