@@ -201,6 +201,8 @@ class Driver(QuickVehicle):
     """Least time gap before and behind, between bumpers, to change into."""
     LANE_CHANGE_MAX_BRAKING = 1.8
     """M/s^2 that the driver accepts to brake after a change of lane, or to make others brake."""
+    CLEAR = 0.7
+    """Metres from its lane's middle within which a vehicle has left the other lane."""
     MOVING = 4.0
     """M/s: below this the lateral control slackens, so that creeping cars do not swerve."""
 
@@ -218,14 +220,20 @@ class Driver(QuickVehicle):
         self._blend = _Blend(0.0, 0.0, self.LANE_CHANGE_SECONDS)
         self._since = math.inf
         self._left = self._aim[2]
+        self._leaving: Driver | None = None
 
     @property
     def lanes(self) -> tuple[int, ...]:
         """Numbers of the lanes that it is on or aims at: who changes lanes is on the old one to the end."""
         near = {self.lane_index[2]: None, self.target_lane_index[2]: None}
-        if self._since < self.LANE_CHANGE_SECONDS:
+        if self._changing():
             near[self._left] = None
         return tuple(near)
+
+    def _changing(self) -> bool:
+        """Whether a change of lane is under way: at a crawl it takes longer than it is meant to."""
+        _, across = self.place_on(self.road.network.get_lane(self._aim))
+        return self._since < self.LANE_CHANGE_SECONDS or abs(across) > self.CLEAR
 
     def resize(self, length: float, width: float) -> None:
         """Set the footprint, metres."""
@@ -258,9 +266,22 @@ class Driver(QuickVehicle):
         heading_ref = lane.heading_at(later) + math.asin(_clip(sideways / speed, -0.25, 0.25)) - slip
         return self.steer(self.KP_HEADING * wrap_to_pi(heading_ref - self.heading))
 
+    def act(self, action: Any = None) -> None:
+        """Decide, and have who comes behind on the lane that is being left follow until it is clear."""
+        super().act(action)
+        self._leaving = None
+        if self._changing() and self.lane_index[2] != self._left:
+            _, behind = self.road.neighbour_vehicles(self, (*self.lane_index[:2], self._left))
+            if isinstance(behind, Driver):
+                behind._leaving = self
+
+    def _follow(self, lane_index: LaneIndex) -> float:
+        wish = super()._follow(lane_index)
+        return wish if self._leaving is None else min(wish, self.acceleration(self, self._leaving))
+
     def change_lane_policy(self) -> None:
         """Decide now and then whether to change lanes; a change that has begun is finished."""
-        if self.lane_index == self.target_lane_index and self._since >= self.LANE_CHANGE_SECONDS:
+        if self.lane_index == self.target_lane_index and not self._changing():
             super().change_lane_policy()
 
     def mobil(self, lane_index: LaneIndex) -> bool:
