@@ -11,14 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.in_car.evidence import CLOSING, CLOSING_SHARE
-from tracker.in_car.extent import fit_extent
+from tracker.in_car.extent import REAR, SLIMMEST, WIDEST, Relief, clear, make_relief, refine, roof_row
 from tracker.in_car.points import PointStore
 from tracker.in_car.proposals import (
     BODY_PLAY,
     BODY_SHARE,
-    SLIMMEST,
-    USUAL,
-    WIDEST,
     misfit,
     propose,
     windows_from_edges,
@@ -57,7 +54,7 @@ class Vehicle:
     members: int = 0
     confirmed: bool = False
     clear: float = 0.0
-    log_width: float = float(np.log(USUAL))
+    log_width: float = float(np.log(REAR))
     rate_of_scale: float = 0.0
     better: int = 0
     rate_error: float = 10.0
@@ -101,13 +98,14 @@ class VehicleStore:
             farthest: Least height of the horizon above a contact row, px: beyond that no vehicle is begun.
         """
         horizon = float(ego.focus[1])
+        relief = make_relief(grey, horizon=horizon, middle=float(ego.focus[0]), focal=ego.focal)
         for vehicle in self.vehicles:
             self._carry(vehicle, points, moved)
             self._weigh(vehicle, points, ratios, trust, ego)
-            self._hold(vehicle, grey, points, horizon)
+            self._hold(vehicle, relief, points)
         self._end(grey, points, horizon)
         self._join(points, moved, ego.speed)
-        self._begin(grey, points, moved, horizon, farthest)
+        self._begin(relief, points, moved, farthest)
 
     def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats) -> None:
         """Move the box with its points."""
@@ -226,25 +224,24 @@ class VehicleStore:
         unlike = int((ring & (points.evidence < -0.5)).sum())
         return 2.0 * max(like - unlike - 1, 0) / (like + unlike + vehicle.members + 1.0)
 
-    def _hold(self, vehicle: Vehicle, grey: NDArray[np.uint8], points: PointStore, horizon: float) -> None:
+    def _hold(self, vehicle: Vehicle, relief: Relief, points: PointStore) -> None:
         """Pull the box to the edges of the picture."""
-        own = points.owner == vehicle.id
         box = vehicle.box
-        body = _body(points.position[own], box)
+        contact = box[3] - relief.horizon
+        if contact < 3.0:
+            return
+        body = _body(points.position[points.owner == vehicle.id], box)
         young = vehicle.age < 0.5 * self._rate
-        found = fit_extent(grey, box, loose=0.15 if young else 0.08, body=body)
-        wide, contact = found.box[2] - found.box[0], found.box[3] - horizon
-        clear = min(found.sides, 1.5) + 0.5 * min(max(found.foot, 0.0), 1.5)
-        vehicle.clear += 0.1 * (clear - vehicle.clear)
+        found = refine(relief, box, loose=0.08 if young else 0.05, body=body, log_width=vehicle.log_width)
+        wide, contact = found[2] - found[0], found[3] - relief.horizon
+        shown = clear(relief, found)
+        vehicle.clear += 0.1 * (shown - vehicle.clear)
         if contact <= 2.0 or not SLIMMEST * contact < wide < WIDEST * contact:
             return
         # A vehicle keeps its width in metres, which its width over the height of the horizon is.
-        ratio = np.log(wide / contact)
-        if not young and abs(ratio - vehicle.log_width) > 0.2:
-            return
-        vehicle.log_width += (0.2 if young else 0.02) * (ratio - vehicle.log_width)
-        gain = (0.3 if young else 0.12) * min(clear / 1.2, 1.0)
-        vehicle.box = box + gain * (found.box - box)
+        vehicle.log_width += (0.2 if young else 0.04) * (np.log(wide / contact) - vehicle.log_width)
+        gain = (0.3 if young else 0.15) * min(shown, 1.0)
+        vehicle.box = box + gain * (found - box)
 
     def _end(self, grey: NDArray[np.uint8], points: PointStore, horizon: float) -> None:
         height, width = grey.shape
@@ -296,68 +293,47 @@ class VehicleStore:
             fresh &= (points.evidence > 0.3) | (moving < 2.0)
             points.owner[fresh] = vehicle.id
 
-    def _begin(
-        self,
-        grey: NDArray[np.uint8],
-        points: PointStore,
-        moved: Floats,
-        horizon: float,
-        farthest: float,
-    ) -> None:
+    def _begin(self, relief: Relief, points: PointStore, moved: Floats, farthest: float) -> None:
+        """Begin vehicles where unowned points move like one within a clear outline; replace bad outlines."""
         ripe = points.age >= 4
-        likely = ripe & (points.evidence > 1.0) & (points.position[:, 1] > horizon + 2.0)
+        likely = ripe & (points.evidence > 1.0) & (points.position[:, 1] > relief.horizon + 2.0)
         if likely.sum() < 2:
             return
         position = points.position
-        windows, clear = windows_from_edges(
-            grey, position[likely], horizon, NEAREST_SHARE * farthest, farthest
-        )
+        windows, shown = windows_from_edges(relief, position[likely], NEAREST_SHARE * farthest, farthest)
         known = ripe & (np.abs(points.evidence) > 0.8)
-        seen = position[known], moved[known], points.evidence[known], horizon
-        for window, value in zip(*propose(windows, clear, *seen, least=LEAST, most=12), strict=True):
+        seen = position[known], moved[known], points.evidence[known]
+        for window, value in zip(
+            *propose(windows, shown, *seen, relief.horizon, least=LEAST, most=12), strict=True
+        ):
+            inside = _inside(position, window, 0.05) & (points.evidence > 0.5)
+            window[1] = roof_row(relief, window[0], window[2], window[3], _body(position[inside], window)[1])
             shared = [_covered(window, one.box) for one in self.vehicles]
             if not shared or max(shared) < 0.3:
-                self._try(window, grey, points, ripe & (points.owner == 0), horizon, farthest)
+                self._try(window, points, ripe & (points.owner == 0), relief.horizon)
                 continue
             # A better outline of a vehicle that is tracked already.
             rival = self.vehicles[int(np.argmax(shared))]
-            if value > BETTER * max(worth(rival.box, grey, *seen), 0.0):
+            if value > BETTER * max(worth(rival.box, relief, *seen), 0.0):
                 rival.better += 1
                 if rival.better >= 3:
                     rival.box, rival.better = window.copy(), 0
-                    rival.log_width = float(np.log((window[2] - window[0]) / (window[3] - horizon)))
+                    rival.log_width = float(np.log((window[2] - window[0]) / (window[3] - relief.horizon)))
             else:
                 rival.better = 0
 
-    def _try(
-        self,
-        window: Floats,
-        grey: NDArray[np.uint8],
-        points: PointStore,
-        free: NDArray[np.bool_],
-        horizon: float,
-        farthest: float,
-    ) -> None:
-        inside = _inside(points.position, window, 0.05) & free & (points.evidence > 0.5)
-        body = _body(points.position[inside], window)
-        found = fit_extent(grey, window, loose=0.12, body=body)
-        box = found.box
-        wide, contact = box[2] - box[0], box[3] - horizon
-        if contact < farthest or not SLIMMEST * contact < wide < WIDEST * contact:
-            return
-        if found.sides < 0.5:
-            return
+    def _try(self, box: Floats, points: PointStore, free: NDArray[np.bool_], horizon: float) -> None:
         if any(_covered(box, other.box) > 0.35 for other in self.vehicles):
             return
         members = _inside(points.position, box, 0.05) & free
         good = members & (points.evidence > 0.5)
         if good.sum() < 2 or (members & (points.evidence < -0.8)).sum() > 0.5 * good.sum():
             return
-        vehicle = Vehicle(id=self._next_id, box=box, log_width=float(np.log(wide / contact)))
+        vehicle = Vehicle(
+            id=self._next_id, box=box, log_width=float(np.log((box[2] - box[0]) / (box[3] - horizon)))
+        )
         self._next_id += 1
-        flow = points.flow[good]
-        vehicle.velocity = np.median(flow, axis=0)
-        vehicle.odds = 0.0
+        vehicle.velocity = np.median(points.flow[good], axis=0)
         vehicle.members = int(good.sum())
         points.owner[good] = vehicle.id
         self.vehicles.append(vehicle)
