@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 # Rear of a vehicle: width over the height of the horizon above its contact row, i.e. metres over metres of
 # camera height, and the standard deviation of its logarithm.
-REAR, REAR_SPREAD = 1.48, 0.17
+REAR, REAR_SPREAD = 1.55, 0.17
 # The same bounds for the whole outline, which may show a side of the vehicle, too.
 SLIMMEST, WIDEST = 0.85, 3.2
 # Length of a vehicle over the camera's height: how much of its side is seen from another lane.
@@ -148,7 +148,7 @@ def _size_cost(left, right, contact, middle, focal, cut):  # type: ignore[no-unt
 
 @njit(cache=True)
 def clearness(across, signed, down, x0, x1, row, contact):  # type: ignore[no-untyped-def]
-    """Return how clearly the picture shows an outline, 0 to about 3, and the weaker of its sides."""
+    """Return how clearly the picture shows an outline, 0 to 3.4, and the weaker of its sides."""
     width = across.shape[1] - 1
     wide = x1 - x0
     usual = REAR * contact
@@ -167,7 +167,8 @@ def clearness(across, signed, down, x0, x1, row, contact):  # type: ignore[no-un
     for i in range(int(row + 0.5) - 1, int(row + 0.5) + 2):
         foot = max(foot, _foot(signed, down, int(max(x0, 0.0)), int(min(x1, width)), i, rows))
     weaker = min(sides[0], sides[1])
-    return max(0.35 * weaker + 0.15 * (sides[0] + sides[1]) + 0.6 * foot, 0.0), weaker
+    # Without a foot there is no vehicle, but by night the ground is black and shows none.
+    return (0.2 + 0.5 * min(weaker, 3.0)) * min(max(0.5 + 0.5 * foot, 0.3), 2.0), weaker
 
 
 @njit(cache=True)
@@ -240,7 +241,7 @@ def outlines(across, signed, down, x, y, horizon, middle, focal, rows, limit):  
                 if cost > 5.0:
                     continue
                 clear, weaker = clearness(across, signed, down, left, right, row, contact)
-                if clear < 0.6 or weaker < 0.9:
+                if clear < 0.35 or weaker < 0.5:
                     continue
                 found[used, 0], found[used, 1], found[used, 2] = left, right, row
                 found[used, 3] = clear * math.exp(-0.5 * cost)

@@ -12,18 +12,11 @@ from tracker.in_car.extent import Relief, clear, outlines
 
 Floats = NDArray[np.float64]
 
-# Room that a point takes on a vehicle up to so wide (px), px^2 a point: a window much larger than its
-# points' room is none.
-# Wider vehicles have no more points: they are near, where the grid of corners is coarse.
-ROOM, ROOM_WIDTH = 200.0, 60.0
-
-
 # How far around a window its cut-off parts are looked for, as a share of its width: less than the gap
 # between two lanes.
-CUT = 0.5
-# Log odds beyond which more points add nothing: how well they fill a window is to decide, not how many they
-# are.
-ENOUGH = 60.0
+CUT = 0.3
+# Log odds beyond which more points add nothing: the picture's edges are to decide then.
+ENOUGH = 10.0
 # How far the points of one body may move apart over the remembered time: px, and as a share of its width.
 BODY_PLAY, BODY_SHARE = 1.0, 0.02
 # Where the points of a vehicle lie in its window, as shares of its width: their mean above the ground, with
@@ -53,7 +46,7 @@ def _score(windows, x, y, u, v, evidence, horizon):  # type: ignore[no-untyped-d
     scores = np.zeros((windows.shape[0], 3))
     for k in range(windows.shape[0]):
         x0, y0, x1, y1 = windows[k, 0], windows[k, 1], windows[k, 2], windows[k, 3]
-        wide, tall = x1 - x0, y1 - y0
+        wide = x1 - x0
         play = 0.04 * wide + 1.0
         total, positive, negative = 0.0, 0, 0
         s, sx, sy, sxx, syy = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -81,7 +74,7 @@ def _score(windows, x, y, u, v, evidence, horizon):  # type: ignore[no-untyped-d
         scores[k, 1] = positive
         scores[k, 2] = negative
         if positive < 2:
-            scores[k, 0] = -1e9
+            scores[k, 0] = 0.0
             continue
         # One body moves as one; and what lies just outside and moves along is a part of it that was cut off.
         moves = BODY_PLAY + BODY_SHARE * wide
@@ -100,11 +93,9 @@ def _score(windows, x, y, u, v, evidence, horizon):  # type: ignore[no-untyped-d
                 continue
             if evidence[i] > 0.8 and abs(u[i] - su / s) < moves and abs(v[i] - sv / s) < moves:
                 cut += min(evidence[i], 4.0)
-        cost = 0.35 * misfit(s, sx, sy, sxx, syy, x0, y1, wide) + scatter / moves**2
-        whole = s / (s + cut)
-        scores[k, 0] = min(total, ENOUGH) * np.exp(-0.8 * cost) * whole**4 - wide * tall / (
-            ROOM * max(1.0, wide / ROOM_WIDTH) ** 2
-        )
+        whole = s / (s + 0.5 * cut)
+        filled = 0.3 + 0.7 * min(total, ENOUGH) / ENOUGH
+        scores[k, 0] = filled * np.exp(-0.5 * min(scatter / moves**2, 4.0)) * whole if total > 0.0 else 0.0
     return scores
 
 
@@ -175,7 +166,7 @@ def propose(
         moved: (N, 2) how far they moved over the remembered time, px.
         evidence: (N,) their log odds.
         horizon: Row, px.
-        least: Least sum of log odds.
+        least: Least worth.
         most: Windows returned at most; they do not overlap.
 
     Returns:
@@ -186,7 +177,7 @@ def propose(
     x, y = np.ascontiguousarray(position.T)
     u, v = np.ascontiguousarray(moved.T)
     scores = _score(windows, x, y, u, v, evidence, horizon)
-    scores[:, 0] *= np.where(scores[:, 0] > 0, clearness, 1.0)
+    scores[:, 0] *= clearness
     good = (scores[:, 0] >= least) & (scores[:, 1] >= 2) & (scores[:, 1] >= 2.0 * scores[:, 2])
     chosen: list[Floats] = []
     worths: list[float] = []

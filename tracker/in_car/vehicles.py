@@ -33,7 +33,7 @@ LOWEST, HIGHEST = -6.0, 8.0
 # How much more a window must be worth than a vehicle's box to replace it.
 BETTER = 1.5
 # Least worth of a window that is begun (`tracker.in_car.proposals`).
-LEAST = 2.0
+LEAST = 0.3
 # The nearest vehicle that is begun is this many times nearer than the farthest.
 NEAREST_SHARE = 12.0
 # Seconds over which the points' evidence is worth once itself: the span of the displacements.
@@ -104,7 +104,7 @@ class VehicleStore:
             self._weigh(vehicle, points, ratios, trust, ego)
             self._hold(vehicle, relief, points)
         self._end(grey, points, horizon)
-        self._join(points, moved, ego.speed)
+        self._join(points, ego.speed)
         self._begin(relief, points, moved, farthest)
 
     def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats) -> None:
@@ -189,8 +189,10 @@ class VehicleStore:
             * self._divergence(vehicle, float(vehicle.box[3] - ego.focus[1]), ego)
             / (self._rate * CORRELATION)
         )
-        gain -= self._ill_filled(vehicle, points) / (self._rate * CORRELATION)
-        gain -= self._alike(vehicle, points) / (self._rate * CORRELATION)
+        # Within a clear outline it matters little where the points lie and what moves alike around it.
+        doubt = self._ill_filled(vehicle, points) + self._alike(vehicle, points)
+        gain -= doubt * max(1.0 - vehicle.clear, 0.0) / (self._rate * CORRELATION)
+        gain += float(np.clip(2.0 * (vehicle.clear - 0.4), -1.0, 0.5)) / (self._rate * CORRELATION)
         vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
         if vehicle.odds > CONFIRM and vehicle.age >= 0.2 * self._rate and vehicle.members >= 2:
             vehicle.confirmed = True
@@ -268,27 +270,21 @@ class VehicleStore:
                 kept.append(vehicle)
         self.vehicles = sorted(kept, key=lambda one: one.id)
 
-    def _join(self, points: PointStore, moved: Floats, moving: float) -> None:
+    def _join(self, points: PointStore, moving: float) -> None:
         """Give new points on a vehicle to it, and take back those that lie outside."""
         x, y = points.position.T
         for vehicle in self.vehicles:
             box = vehicle.box
             wide, tall = box[2] - box[0], box[3] - box[1]
             own = points.owner == vehicle.id
-            far = (x < box[0] - 0.3 * wide) | (x > box[2] + 0.3 * wide)
-            far |= (y < box[1] - 0.35 * wide) | (y > box[3] + 0.2 * wide)
+            far = (x < box[0] - 0.06 * wide - 2.0) | (x > box[2] + 0.06 * wide + 2.0)
+            far |= (y < box[1] - 0.35 * wide) | (y > box[3] + 0.08 * wide + 2.0)
             points.owner[own & far] = 0
             inside = (x > box[0] + 0.03 * wide) & (x < box[2] - 0.03 * wide)
             inside &= (y > box[1] + 0.03 * tall) & (y < box[3] + 0.02 * tall)
-            fringe = (x > box[0] - 0.25 * wide) & (x < box[2] + 0.25 * wide)
-            fringe &= (y > box[1] - 0.3 * wide) & (y < box[3] + 0.15 * wide) & (points.evidence > 2.0)
             middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])])
             expected = vehicle.velocity + vehicle.growth * (points.position - middle)
             along = np.abs(points.flow - expected).max(1) < 0.7 + 0.01 * wide
-            if vehicle.members >= 3:
-                # What is just outside may be a part of it, if over a longer time it moves along.
-                usual = np.median(moved[own], axis=0) if own.any() else np.zeros(2)
-                inside |= fringe & (np.abs(moved - usual).max(1) < 0.8 * BODY_PLAY + BODY_SHARE * wide)
             fresh = inside & along & (points.owner == 0) & (points.age >= 3)
             fresh &= (points.evidence > 0.3) | (moving < 2.0)
             points.owner[fresh] = vehicle.id
@@ -310,7 +306,7 @@ class VehicleStore:
             window[1] = roof_row(relief, window[0], window[2], window[3], _body(position[inside], window)[1])
             shared = [_covered(window, one.box) for one in self.vehicles]
             if not shared or max(shared) < 0.3:
-                self._try(window, points, ripe & (points.owner == 0), relief.horizon)
+                self._try(window, clear(relief, window), points, ripe & (points.owner == 0), relief.horizon)
                 continue
             # A better outline of a vehicle that is tracked already.
             rival = self.vehicles[int(np.argmax(shared))]
@@ -322,7 +318,9 @@ class VehicleStore:
             else:
                 rival.better = 0
 
-    def _try(self, box: Floats, points: PointStore, free: NDArray[np.bool_], horizon: float) -> None:
+    def _try(
+        self, box: Floats, shown: float, points: PointStore, free: NDArray[np.bool_], horizon: float
+    ) -> None:
         if any(_covered(box, other.box) > 0.35 for other in self.vehicles):
             return
         members = _inside(points.position, box, 0.05) & free
@@ -330,7 +328,10 @@ class VehicleStore:
         if good.sum() < 2 or (members & (points.evidence < -0.8)).sum() > 0.5 * good.sum():
             return
         vehicle = Vehicle(
-            id=self._next_id, box=box, log_width=float(np.log((box[2] - box[0]) / (box[3] - horizon)))
+            id=self._next_id,
+            box=box,
+            clear=shown,
+            log_width=float(np.log((box[2] - box[0]) / (box[3] - horizon))),
         )
         self._next_id += 1
         vehicle.velocity = np.median(points.flow[good], axis=0)
