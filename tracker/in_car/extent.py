@@ -22,7 +22,7 @@ SLIMMEST, WIDEST = 0.85, 3.2
 # Length of a vehicle over the camera's height: how much of its side is seen from another lane.
 LENGTH = 3.5
 # Height over width of a rear: a car's usual value and its spread; taller ones (vans, lorries) cost this much.
-ASPECT, ASPECT_SPREAD, TALL = 0.82, 0.16, 1.0
+ASPECT, ASPECT_SPREAD, TALL = 0.77, 0.13, 2.0
 # Greatest height over width.
 TALLEST = 1.65
 # What an edge of the frame counts in place of a vehicle's side.
@@ -100,6 +100,15 @@ def _side(across, column, top, bottom):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _best_side(across, place, top, bottom):  # type: ignore[no-untyped-def]
+    """Return the strength of the strongest vertical edge within a pixel of a place."""
+    best = 0.0
+    for j in range(int(place + 0.5) - 1, int(place + 0.5) + 2):
+        best = max(best, _side(across, j, top, bottom))
+    return best
+
+
+@njit(cache=True)
 def _foot(signed, down, left, right, row, level):  # type: ignore[no-untyped-def]
     """Return how well a row is the lower end of a vehicle, about -1 to 3.
 
@@ -160,8 +169,7 @@ def clearness(across, signed, down, x0, x1, row, contact):  # type: ignore[no-un
         if place < 3.0 or place > width - 3.0:
             sides[k] = FRAME_SIDE
             continue
-        for j in range(int(place + 0.5) - 1, int(place + 0.5) + 2):
-            sides[k] = max(sides[k], min(_side(across, j, top, bottom) / level, 4.0))
+        sides[k] = min(_best_side(across, place, top, bottom) / level, 4.0)
     rows = _mean(down, int(x0), top, int(x1), int(row)) + 3.0
     foot = -1.0
     for i in range(int(row + 0.5) - 1, int(row + 0.5) + 2):
@@ -176,9 +184,14 @@ def outlines(across, signed, down, x, y, horizon, middle, focal, rows, limit):  
     """Pair vertical edges a vehicle's width apart over every row where there is an edge to stand on.
 
     Args:
-        across: See `Relief`; likewise signed, down, horizon, middle, focal.
+        across: See `Relief`.
+        signed: Likewise.
+        down: Likewise.
         x: (N,) px of the points that move like a vehicle.
         y: (N,).
+        horizon: See `Relief`.
+        middle: Likewise.
+        focal: Likewise.
         rows: (R,) contact rows to try.
         limit: Outlines returned at most.
 
@@ -256,7 +269,7 @@ def _beyond(share, free):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _roof(signed, down, x0, x1, row, expected, play, body_top):  # type: ignore[no-untyped-def]
+def _roof(across, signed, down, x0, x1, row, expected, play, body_top):  # type: ignore[no-untyped-def]
     """Return the row of the roof; ``expected`` above 0 pulls it there with the play ``play``."""
     width = signed.shape[1] - 1
     wide = x1 - x0
@@ -279,13 +292,23 @@ def _roof(signed, down, x0, x1, row, expected, play, body_top):  # type: ignore[
             total += value / 3.0
         # What moves with the vehicle lies under its roof.
         value = 0.5 * least + 0.7 * total - cost - _beyond((i - body_top) / wide, 0.04)
+        if row - i > 0.9 * wide:
+            # A tall one has tall sides, else the edge is a line of the background.
+            bottom = int(row - 0.7 * wide)
+            ground = _mean(across, int(x0 - 0.5 * wide), i, int(x1 + 0.5 * wide), bottom) + 2.0
+            weaker = 3.0
+            if x0 >= 3.0:
+                weaker = min(weaker, _best_side(across, x0, i, bottom) / ground)
+            if x1 <= width - 3.0:
+                weaker = min(weaker, _best_side(across, x1, i, bottom) / ground)
+            value += 1.0 * (weaker - 1.5)
         if value > best:
             best, roof = value, float(i)
     return roof
 
 
 @njit(cache=True)
-def _refine(across, signed, down, box, loose, body, horizon, middle, focal, log_width):  # type: ignore[no-untyped-def]
+def _refine(across, signed, down, box, loose, body, horizon, log_width):  # type: ignore[no-untyped-def]
     height, width = across.shape[0] - 1, across.shape[1] - 1
     x0, y0, x1, y1 = box[0], box[1], box[2], box[3]
     wide = x1 - x0
@@ -338,7 +361,7 @@ def _refine(across, signed, down, box, loose, body, horizon, middle, focal, log_
             result[3] = float(i)
     if result[3] >= height - 3:
         result[3] = y1
-    result[1] = _roof(signed, down, result[0], result[2], result[3], y0, 2.0 * play, body[1])
+    result[1] = _roof(across, signed, down, result[0], result[2], result[3], y0, 2.0 * play, body[1])
     return result
 
 
@@ -360,8 +383,6 @@ def refine(relief: Relief, box: Floats, *, loose: float, body: Floats, log_width
         loose,
         body,
         relief.horizon,
-        relief.middle,
-        relief.focal,
         log_width,
     )
     return found
@@ -369,7 +390,7 @@ def refine(relief: Relief, box: Floats, *, loose: float, body: Floats, log_width
 
 def roof_row(relief: Relief, x0: float, x1: float, row: float, body_top: float) -> float:
     """Return the most likely row of the roof over an outline's sides and foot."""
-    return float(_roof(relief.signed, relief.down, x0, x1, row, 0.0, 0.0, body_top))
+    return float(_roof(relief.across, relief.signed, relief.down, x0, x1, row, 0.0, 0.0, body_top))
 
 
 def clear(relief: Relief, box: Floats) -> float:

@@ -29,13 +29,15 @@ Floats = NDArray[np.float64]
 # Log odds at which a vehicle is confirmed, and below which it is given up.
 CONFIRM, REJECT = 2.5, -1.5
 # Bounds of the log odds: old evidence must not outlast new evidence for too long.
-LOWEST, HIGHEST = -6.0, 8.0
+LOWEST, HIGHEST = -6.0, 5.0
 # How much more a window must be worth than a vehicle's box to replace it.
-BETTER = 1.5
+BETTER = 1.3
 # Least worth of a window that is begun (`tracker.in_car.proposals`).
 LEAST = 0.3
 # The nearest vehicle that is begun is this many times nearer than the farthest.
 NEAREST_SHARE = 12.0
+# Clearness of the outline below which a vehicle is not confirmed, and below which it is given up.
+SHOWN, LOST = 0.6, 0.4
 # Seconds over which the points' evidence is worth once itself: the span of the displacements.
 CORRELATION = 0.35
 
@@ -194,7 +196,12 @@ class VehicleStore:
         gain -= doubt * max(1.0 - vehicle.clear, 0.0) / (self._rate * CORRELATION)
         gain += float(np.clip(2.0 * (vehicle.clear - 0.4), -1.0, 0.5)) / (self._rate * CORRELATION)
         vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
-        if vehicle.odds > CONFIRM and vehicle.age >= 0.2 * self._rate and vehicle.members >= 2:
+        if (
+            vehicle.odds > CONFIRM
+            and vehicle.clear > SHOWN
+            and vehicle.age >= 0.2 * self._rate
+            and vehicle.members >= 2
+        ):
             vehicle.confirmed = True
 
     def _ill_filled(self, vehicle: Vehicle, points: PointStore) -> float:
@@ -249,7 +256,7 @@ class VehicleStore:
         height, width = grey.shape
         patience = 0.5 * self._rate
         kept: list[Vehicle] = []
-        for vehicle in sorted(self.vehicles, key=lambda one: (not one.confirmed, -one.odds)):
+        for vehicle in sorted(self.vehicles, key=lambda one: (not one.confirmed, -one.clear)):
             box = vehicle.box
             wide, tall = box[2] - box[0], box[3] - box[1]
             seen = max(min(box[2], width) - max(box[0], 0.0), 0.0) * max(
@@ -257,6 +264,7 @@ class VehicleStore:
             )
             gone = (
                 vehicle.odds < REJECT
+                or (vehicle.clear < LOST and vehicle.age > 0.3 * self._rate)
                 or vehicle.missed > (patience if vehicle.confirmed else 3)
                 or seen < 0.25 * wide * tall
                 or tall < 6.0
