@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 # Rear of a vehicle: width over the height of the horizon above its contact row, i.e. metres over metres of
 # camera height, and the standard deviation of its logarithm.
-REAR, REAR_SPREAD = 1.55, 0.17
+REAR, REAR_SPREAD = 1.5, 0.24
 # The same bounds for the whole outline, which may show a side of the vehicle, too.
 SLIMMEST, WIDEST = 0.85, 3.2
 # Length of a vehicle over the camera's height: how much of its side is seen from another lane.
@@ -144,6 +144,15 @@ def rear_ratio(left, right, contact, middle, focal):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
+def _rear_columns(left, right, contact, middle, focal, width):  # type: ignore[no-untyped-def]
+    """Return the columns between which the rear stands on its row: the side's foot rises from there."""
+    share = min(LENGTH * contact / focal, 0.5)
+    first = left + min(max(left - middle, 0.0) * share, 0.5 * (right - left))
+    last = right - min(max(middle - right, 0.0) * share, 0.5 * (right - left))
+    return int(max(first, 0.0)), int(min(last, width))
+
+
+@njit(cache=True)
 def _size_cost(left, right, contact, middle, focal, cut):  # type: ignore[no-untyped-def]
     """Cost of a width; a vehicle that is cut off by the frame may well be wider than it looks."""
     rear = rear_ratio(left, right, contact, middle, focal)
@@ -156,7 +165,7 @@ def _size_cost(left, right, contact, middle, focal, cut):  # type: ignore[no-unt
 
 
 @njit(cache=True)
-def clearness(across, signed, down, x0, x1, row, contact):  # type: ignore[no-untyped-def]
+def clearness(across, signed, down, x0, x1, row, contact, middle, focal):  # type: ignore[no-untyped-def]
     """Return how clearly the picture shows an outline, 0 to 3.4, and the weaker of its sides."""
     width = across.shape[1] - 1
     wide = x1 - x0
@@ -172,8 +181,9 @@ def clearness(across, signed, down, x0, x1, row, contact):  # type: ignore[no-un
         sides[k] = min(_best_side(across, place, top, bottom) / level, 4.0)
     rows = _mean(down, int(x0), top, int(x1), int(row)) + 3.0
     foot = -1.0
+    first, last = _rear_columns(x0, x1, contact, middle, focal, width)
     for i in range(int(row + 0.5) - 1, int(row + 0.5) + 2):
-        foot = max(foot, _foot(signed, down, int(max(x0, 0.0)), int(min(x1, width)), i, rows))
+        foot = max(foot, _foot(signed, down, first, last, i, rows))
     weaker = min(sides[0], sides[1])
     # Without a foot there is no vehicle, but by night the ground is black and shows none.
     return (0.2 + 0.5 * min(weaker, 3.0)) * min(max(0.5 + 0.5 * foot, 0.3), 2.0), weaker
@@ -253,7 +263,7 @@ def outlines(across, signed, down, x, y, horizon, middle, focal, rows, limit):  
                 cost = _size_cost(left, right, contact, middle, focal, cut)
                 if cost > 5.0:
                     continue
-                clear, weaker = clearness(across, signed, down, left, right, row, contact)
+                clear, weaker = clearness(across, signed, down, left, right, row, contact, middle, focal)
                 if clear < 0.35 or weaker < 0.5:
                     continue
                 found[used, 0], found[used, 1], found[used, 2] = left, right, row
@@ -308,7 +318,7 @@ def _roof(across, signed, down, x0, x1, row, expected, play, body_top):  # type:
 
 
 @njit(cache=True)
-def _refine(across, signed, down, box, loose, body, horizon, log_width):  # type: ignore[no-untyped-def]
+def _refine(across, signed, down, box, loose, body, horizon, middle, focal, log_width):  # type: ignore[no-untyped-def]
     height, width = across.shape[0] - 1, across.shape[1] - 1
     x0, y0, x1, y1 = box[0], box[1], box[2], box[3]
     wide = x1 - x0
@@ -348,7 +358,7 @@ def _refine(across, signed, down, box, loose, body, horizon, log_width):  # type
                     result[0] = float(left)
                 if not fixed_right:
                     result[2] = float(right)
-    first, last = int(max(result[0], 0.0)), int(min(result[2], width))
+    first, last = _rear_columns(result[0], result[2], contact, middle, focal, width)
     rows = _mean(down, first, top, last, int(y1)) + 3.0
     best = -1e9
     for i in range(max(int(y1) - reach, int(horizon) + 3), min(int(y1) + reach + 2, height)):
@@ -383,6 +393,8 @@ def refine(relief: Relief, box: Floats, *, loose: float, body: Floats, log_width
         loose,
         body,
         relief.horizon,
+        relief.middle,
+        relief.focal,
         log_width,
     )
     return found
@@ -396,7 +408,17 @@ def roof_row(relief: Relief, x0: float, x1: float, row: float, body_top: float) 
 def clear(relief: Relief, box: Floats) -> float:
     """Return how clearly the picture shows a box (4,), as for the windows of `tracker.in_car.proposals`."""
     contact = max(float(box[3]) - relief.horizon, 1.0)
-    value, _ = clearness(relief.across, relief.signed, relief.down, box[0], box[2], box[3], contact)
+    value, _ = clearness(
+        relief.across,
+        relief.signed,
+        relief.down,
+        box[0],
+        box[2],
+        box[3],
+        contact,
+        relief.middle,
+        relief.focal,
+    )
     width = relief.across.shape[1] - 1
     cut = bool(box[0] < 3.0 or box[2] > width - 3.0)
     cost = _size_cost(box[0], box[2], contact, relief.middle, relief.focal, cut)
