@@ -37,7 +37,7 @@ LEAST = 0.3
 # The nearest vehicle that is begun is this many times nearer than the farthest.
 NEAREST_SHARE = 12.0
 # Clearness of the outline below which a vehicle is not confirmed, and below which it is given up.
-SHOWN, LOST = 0.6, 0.4
+SHOWN, LOST = 0.45, 0.3
 # Seconds over which the points' evidence is worth once itself: the span of the displacements.
 CORRELATION = 0.35
 
