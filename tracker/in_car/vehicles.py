@@ -38,6 +38,8 @@ LEAST = 0.3
 NEAREST_SHARE = 12.0
 # Clearness of the outline below which a vehicle is not confirmed, and below which it is given up.
 SHOWN, LOST = 0.45, 0.3
+# The picture is searched for new outlines once in so many frames.
+SEARCH = 3
 # Seconds over which the points' evidence is worth once itself: the span of the displacements.
 CORRELATION = 0.35
 
@@ -76,6 +78,7 @@ class VehicleStore:
         """Start without vehicles."""
         self._rate = rate
         self._next_id = 1
+        self._frame = 0
         self.vehicles: list[Vehicle] = []
 
     def step(
@@ -107,7 +110,9 @@ class VehicleStore:
             self._hold(vehicle, relief, points)
         self._end(grey, points, horizon)
         self._join(points, ego.speed)
-        self._begin(relief, points, moved, farthest)
+        self._frame += 1
+        if self._frame % SEARCH == 0:
+            self._begin(relief, points, moved, farthest)
 
     def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats) -> None:
         """Move the box with its points."""
@@ -320,7 +325,7 @@ class VehicleStore:
             rival = self.vehicles[int(np.argmax(shared))]
             if value > BETTER * max(worth(rival.box, relief, *seen), 0.0):
                 rival.better += 1
-                if rival.better >= 3:
+                if rival.better >= 2:
                     rival.box, rival.better = window.copy(), 0
                     rival.log_width = float(np.log((window[2] - window[0]) / (window[3] - relief.horizon)))
             else:
