@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+COOLNESS = 0.99
+"""How far drivers trust that the one ahead does nothing abrupt: cut in on, they fall back without haste."""
+
 
 class QuickVehicle(IDMVehicle):  # type: ignore[misc]
     """highway-env's `IDMVehicle`, bit for bit, in a fraction of the time.
@@ -187,16 +190,17 @@ class Driver(QuickVehicle):
     """A vehicle of true size whose driver is gentler than highway-env's.
 
     Gaps are measured between bumpers and not between middles. A driver who is too fast for what lies ahead
-    brakes comfortably (the improved IDM: Treiber and Kesting, Traffic Flow Dynamics, 2013, section 11.3.7). A
+    brakes comfortably (the improved IDM: Treiber and Kesting, Traffic Flow Dynamics, 2013, section 11.3.7).
+    One whose gap was shortened by somebody who cut in widens it calmly (the ACC model, section 11.3.8). A
     change of lane takes seconds and follows a polynomial with continuous acceleration. On arcs the driver
     allows for the body's slip.
     """
 
     LANE_CHANGE_SECONDS = 4.5
-    ROOM_SECONDS = 0.5
+    ROOM_SECONDS = 0.45
     """Least time gap before and behind, between bumpers, to change into."""
-    LANE_CHANGE_MAX_BRAKING = 1.0
-    """M/s^2 that a driver accepts to brake after a change of lane."""
+    LANE_CHANGE_MAX_BRAKING = 1.8
+    """M/s^2 that the driver accepts to brake after a change of lane, or to make others brake."""
     MOVING = 4.0
     """M/s: below this the lateral control slackens, so that creeping cars do not swerve."""
 
@@ -295,7 +299,7 @@ class Driver(QuickVehicle):
         front_vehicle: Any = None,
         rear_vehicle: Any = None,  # noqa: ARG002
     ) -> float:
-        """Return the improved IDM's acceleration, m/s^2."""
+        """Return the enhanced IDM's acceleration, m/s^2."""
         if not ego_vehicle:
             return 0.0
         speed, target = max(ego_vehicle.speed, 0.0), ego_vehicle.target_speed
@@ -310,10 +314,16 @@ class Driver(QuickVehicle):
         gap = max(ego_vehicle.lane_distance_to(front_vehicle) - between, 0.1)
         ratio = max(self.desired_gap(ego_vehicle, front_vehicle), self.jam_gap) / gap
         if speed > target:
-            return float(free if ratio < 1 else free + most * (1 - ratio**2))
-        if ratio >= 1 or free <= 0:
-            return float(most * (1 - ratio**2))
-        return float(free * (1 - ratio ** min(2 * most / free, 60.0)))
+            wish = free if ratio < 1 else free + most * (1 - ratio**2)
+        elif ratio >= 1 or free <= 0:
+            wish = most * (1 - ratio**2)
+        else:
+            wish = free * (1 - ratio ** min(2 * most / free, 60.0))
+        needed = _constant_acceleration(speed, gap, front_vehicle, most)
+        if wish < needed:
+            calm = needed + comfort * math.tanh((wish - needed) / comfort)
+            wish += COOLNESS * (calm - wish)
+        return float(wish)
 
     def desired_gap(self, ego_vehicle: Any, front_vehicle: Any = None, projected: bool = True) -> float:
         """Return the desired gap between bumpers, metres."""
@@ -330,6 +340,18 @@ class Driver(QuickVehicle):
         self._since += dt
         super().step(dt)
         self.speed = max(self.speed, 0.0)
+
+
+def _constant_acceleration(speed: float, gap: float, leader: Any, most: float) -> float:
+    """Acceleration that just avoids a crash if the leader accelerates on as now, m/s^2.
+
+    It is at most ``most`` (Kesting, Treiber and Helbing, Phil. Trans. R. Soc. A 368, 2010, eq. 2.5).
+    """
+    leading, push = max(leader.speed, 0.0), min(leader.action["acceleration"], most)
+    closing = speed - leading
+    if leading * closing < -2 * gap * push:  # the leader stops first, or runs away
+        return float(speed**2 * push / max(leading**2 - 2 * gap * push, 1e-9))
+    return float(push - max(closing, 0.0) ** 2 / (2 * gap))
 
 
 class _Blend:

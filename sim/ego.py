@@ -112,6 +112,7 @@ class ActionDriver(Driver):
             return
         self.target_lane_index = self.lane_index
         self.target_speed = self.speed
+        self.action = {"steering": 0.0, "acceleration": self.command[0]}  # which those behind see
 
     def step(self, dt: float) -> None:
         """Move for ``dt`` seconds along the mean heading."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,6 +25,32 @@ PAINTS = (
 """Shares of the paints on the roads, their sRGB, and how far single vehicles stray from it."""
 LORRY_SPEED = 23.0
 """M/s that no lorry exceeds."""
+WITHIN_LANE = 0.5
+"""Standard deviation of desired speeds within a lane, as a part of that of all lanes together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surge:
+    """A slow swing of the wanted speed: nobody keeps a speed to the decimal.
+
+    Attributes:
+        strength: Amplitude, as a part of the speed.
+        period: Seconds.
+        phase: Radians at t = 0.
+    """
+
+    strength: float
+    period: float
+    phase: float
+
+    def at(self, t: float) -> float:
+        """Factor of the wanted speed at ``t`` seconds."""
+        return 1.0 + self.strength * math.sin(2 * math.pi * t / self.period + self.phase)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, *, strength: float, periods: tuple[float, float]) -> Surge:
+        """Draw period and phase."""
+        return cls(strength, float(rng.uniform(*periods)), float(rng.uniform(0, 2 * math.pi)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +68,7 @@ class Draw:
         acceleration: Comfortable, m/s^2.
         braking: Comfortable, m/s^2, positive.
         politeness: MOBIL's, in [0, 1].
+        surge: How the speed that it wants swells and sinks.
     """
 
     model: int
@@ -53,6 +81,7 @@ class Draw:
     acceleration: float
     braking: float
     politeness: float
+    surge: Surge
 
     @property
     def limit(self) -> float:
@@ -91,11 +120,12 @@ class Fleet:
         weights = np.array([share for share, _, _ in PAINTS])
         self._paint_edges = np.cumsum(weights / weights.sum())
 
-    def draw(self, rng: np.random.Generator, *, light: bool = False) -> Draw:
+    def draw(self, rng: np.random.Generator, *, pace: float = 0.0, light: bool = False) -> Draw:
         """Draw one vehicle.
 
         Args:
             rng: Its own stream.
+            pace: How much faster its lane is than the mean, in standard deviations of all desired speeds.
             light: Leave out lorries and buses, for lanes that they do not use.
         """
         p = self._params
@@ -111,7 +141,7 @@ class Fleet:
         choices = self._models[kind]
         model = choices[int(rng.integers(len(choices)))]
         heavy = kind in (Kind.LORRY, Kind.BUS)
-        speed = p.speed + p.speed_spread * float(np.clip(rng.normal(), -2, 2))
+        speed = p.speed + p.speed_spread * (pace + WITHIN_LANE * float(np.clip(rng.normal(), -2, 2)))
         if heavy:
             speed = min(0.88 * speed, LORRY_SPEED)
         return Draw(
@@ -120,12 +150,24 @@ class Fleet:
             size=self._catalogue[model].size,
             colour=self.paint(rng),
             speed=max(speed, 0.0),
-            headway=float(rng.uniform(1.4, 2.0) if heavy else rng.uniform(0.9, 1.6)),
+            headway=float(rng.uniform(1.2, 1.8) if heavy else rng.uniform(0.7, 1.3)),
             jam_gap=float(rng.uniform(1.8, 3.0)),
             acceleration=float(rng.uniform(0.8, 1.1) if heavy else rng.uniform(1.3, 2.0)),
             braking=float(rng.uniform(1.6, 2.4)),
-            politeness=float(rng.uniform(0.1, 0.5)),
+            politeness=float(rng.uniform(0.0, 0.3)),
+            surge=Surge.draw(rng, strength=0.07, periods=(15.0, 40.0)),
         )
+
+    @staticmethod
+    def lane_pace(lane: int, lanes: int) -> float:
+        """Return the ``pace`` of a lane, from the left: even steps from fast to slow.
+
+        With `WITHIN_LANE` the desired speeds of all lanes together have unit standard deviation.
+        """
+        if lanes == 1:
+            return 0.0
+        steps = np.linspace(1.0, -1.0, lanes)
+        return float(steps[lane] / np.std(steps) * math.sqrt(1 - WITHIN_LANE**2))
 
     def paint(self, rng: np.random.Generator) -> tuple[float, float, float]:
         """Draw a paint, sRGB."""

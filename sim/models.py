@@ -108,9 +108,10 @@ class Light:
         horizon: (3,) sky radiance at the horizon, also the colour of haze.
         cloud: Share of the sky under cloud, [0, 1].
         haze: Extinction per metre.
-        night: Whether lamps, headlights and street lamps shine.
+        night: Whether headlights shine and the beam of the own car lights the road.
         wet: How wet the road is, [0, 1].
         seed: Of the clouds and of the asphalt's patches.
+        street_lamps: Whether street lamps shine at night.
     """
 
     sun: NDArray[np.float64]
@@ -122,3 +123,4 @@ class Light:
     night: bool
     wet: float
     seed: int
+    street_lamps: bool = False

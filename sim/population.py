@@ -130,8 +130,8 @@ class Population:
         )
         driver.set_lateral(1.2, 0.3)
         driver.LANE_CHANGE_DELAY = 2.0
-        driver.LANE_CHANGE_MIN_ACC_GAIN = 0.3
-        driver.LANE_CHANGE_MAX_BRAKING_IMPOSED = 1.5
+        driver.LANE_CHANGE_MIN_ACC_GAIN = 0.15
+        driver.LANE_CHANGE_MAX_BRAKING_IMPOSED = driver.LANE_CHANGE_MAX_BRAKING
         driver.ACC_MAX = 7.0
         self.world.vehicles.append(driver)
         return driver
@@ -152,16 +152,18 @@ class Population:
         return actor
 
     def _draw(self, lane: int, same_way: bool) -> Draw:
-        """Draw the next vehicle; lorries and buses keep to the right lane."""
-        rightmost = len(self._road.lane_offsets(same_way)) - 1
+        """Draw the next vehicle; the faster ones to the left, lorries and buses on the right lane only."""
+        lanes = len(self._entries[same_way])
         return self._fleet.draw(
-            stream(self._seed, "traffic", "vehicle", self._number), light=lane < rightmost
+            stream(self._seed, "traffic", "vehicle", self._number),
+            pace=self._fleet.lane_pace(lane, lanes),
+            light=lane < lanes - 1,
         )
 
     def _draw_gap(self, rng: np.random.Generator, same_way: bool, speed: float) -> float:
         """Draw the free road between two vehicles, bumper to bumper, metres."""
         density = self._params.density if same_way else self._params.oncoming_density
-        shortest = 3.0 + 1.1 * speed
+        shortest = 2.5 + 0.7 * speed
         return shortest + float(rng.exponential(max(1000 / density - 5.0 - shortest, 1.0)))
 
     def settled_speed(self, same_way: bool, speed: float) -> float:
@@ -170,16 +172,16 @@ class Population:
         return min(speed, max((1000 / density - 8.0) / 1.3, 0.0))
 
     def populate(self, ego_speed: float) -> None:
-        """Fill the window, close ahead with vehicles about as fast as ``ego_speed``, m/s."""
+        """Fill the window, close ahead with one a little slower than ``ego_speed``, m/s."""
         me = self.ego
         if self._params.density > 0:
             rng = stream(self._seed, "traffic", "neighbours")
             for lane in range(self._road.params.lanes):
                 mine = lane == me.lane_index[2]
                 first = float(rng.uniform(14.0, 32.0) if mine else rng.uniform(8.0, 45.0))
-                pace = float(rng.uniform(0.88, 1.02) if mine else rng.uniform(0.85, 1.15))
-                self._fill(lane, True, self.ego_s + first, first_speed=pace * ego_speed)
-                self._fill_behind(lane, self.ego_s if mine else self.ego_s + first - 5.0)
+                slower = float(rng.uniform(0.86, 1.0)) * ego_speed
+                self._fill(lane, True, self.ego_s + first, first_speed=slower if mine else None)
+                self._fill_behind(lane, self.ego_s - me.LENGTH / 2 if mine else self.ego_s + first)
         if self._params.oncoming_density > 0:
             for lane, rng in enumerate(self._entries[False]):
                 low = self.ego_s - BEHIND_ONCOMING
@@ -197,15 +199,16 @@ class Population:
             s += draw.size[0] / 2 + self._draw_gap(self._entries[same_way][lane], same_way, speed)
 
     def _fill_behind(self, lane: int, s: float) -> None:
-        """Place vehicles of the ego's way from ``s`` back to the window's near end."""
+        """Place vehicles of the ego's way from ``s``, a rear bumper, back to the window's near end."""
         rng = self._entries[True][lane]
         while True:
             draw = self._draw(lane, True)
             speed = self._entry_speed(draw, s, True)
-            s -= draw.size[0] + self._draw_gap(rng, True, speed)
+            s -= self._draw_gap(rng, True, speed) + draw.size[0] / 2
             if s < max(self.ego_s - BEHIND, self._near_end):
                 return
             self._add(draw, lane, True, s, speed)
+            s -= draw.size[0] / 2
 
     def _entry_speed(self, draw: Draw, s: float, same_way: bool) -> float:
         allowed = self._pace.allowed(s, self.time, same_way=same_way)
@@ -311,4 +314,4 @@ class Population:
 
 def _safe_gap(leading: float, following: float) -> float:
     """Bumper to bumper metres at which a follower needs no more than comfortable braking, speeds in m/s."""
-    return 4.0 + 1.3 * following + max(following**2 - leading**2, 0.0) / 3.0
+    return 4.0 + 1.1 * following + max(following**2 - leading**2, 0.0) / 3.0

@@ -17,7 +17,7 @@ Image = NDArray[np.uint8]
 
 _TILE = 1024
 
-_DAY_LEVEL, _NIGHT_LEVEL = 112.0, 40.0
+_DAY_LEVEL, _NIGHT_LEVEL = 112.0, 9.0
 _DAY_GAIN, _NIGHT_GAIN = (0.72, 1.35), (0.8, 1.25)
 _WIPER_SECONDS = 1.6
 _GLARE = 0.35
@@ -38,23 +38,39 @@ def _develop(
     """Exposure, vignetting and noise in one walk over the pixels."""
     # Most of the noise is common to all three colours: coders and denoisers thin out the rest.
     shared, own = np.float32(0.8), np.float32(0.6)
-    for i in range(image.shape[0]):
-        for j in range(image.shape[1]):
-            share = np.float32(gain) * falloff[i, j]
-            common = shared * tile[i + shifts[0, 0], j + shifts[0, 1]]
-            for c in range(3):
-                value = share * image[i, j, c]
-                value = min(value, np.float32(255.0))
-                noise = common + own * tile[i + shifts[c + 1, 0], j + shifts[c + 1, 1]]
-                value += noise * amplitude[int(value)] + np.float32(0.5)
-                out[i, j, c] = np.uint8(min(max(value, np.float32(0.0)), np.float32(255.0)))
+    black, white = np.float32(0.0), np.float32(255.0)
+    rows, columns = image.shape[:2]
+    first, second, third, fourth = (
+        tile[shifts[0, 0] : shifts[0, 0] + rows, shifts[0, 1] : shifts[0, 1] + columns],
+        tile[shifts[1, 0] : shifts[1, 0] + rows, shifts[1, 1] : shifts[1, 1] + columns],
+        tile[shifts[2, 0] : shifts[2, 0] + rows, shifts[2, 1] : shifts[2, 1] + columns],
+        tile[shifts[3, 0] : shifts[3, 0] + rows, shifts[3, 1] : shifts[3, 1] + columns],
+    )
+    strength = np.float32(gain)
+    for i in range(rows):
+        for j in range(columns):
+            share = strength * falloff[i, j]
+            red, green, blue = share * image[i, j, 0], share * image[i, j, 1], share * image[i, j, 2]
+            grey = np.float32(0.25) * (red + green + green + blue)
+            deviation = amplitude[np.int32(min(grey, white))]
+            common = np.float32(0.5) + deviation * shared * first[i, j]
+            deviation *= own
+            red = min(red, white) + common + deviation * second[i, j]
+            green = min(green, white) + common + deviation * third[i, j]
+            blue = min(blue, white) + common + deviation * fourth[i, j]
+            out[i, j, 0] = np.uint8(np.int32(min(max(red, black), white)))
+            out[i, j, 1] = np.uint8(np.int32(min(max(green, black), white)))
+            out[i, j, 2] = np.uint8(np.int32(min(max(blue, black), white)))
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _refract(
     image: NDArray[np.uint8], soft: NDArray[np.uint8], places: NDArray[np.float64], radii: NDArray[np.float64]
 ) -> None:
-    """Put drops on the windscreen: each shows ``soft``, the scene at an eighth of its size."""
+    """Put drops on the windscreen: each shows upside down what of ``soft`` lies around it.
+
+    ``soft`` is the scene out of focus, at an eighth of its size.
+    """
     rows, columns = image.shape[:2]
     for drop in range(radii.size):
         x, y, radius = places[drop, 0], places[drop, 1], radii[drop]
@@ -62,12 +78,12 @@ def _refract(
         for i in range(max(int(y) - reach, 0), min(int(y) + reach, rows)):
             for j in range(max(int(x) - reach, 0), min(int(x) + reach, columns)):
                 across, down = (j + 0.5 - x) / radius, (i + 0.5 - y) / (1.15 * radius)
-                share = 0.75 * min(max(1.5 - np.sqrt(across * across + down * down), 0.0), 1.0)
+                share = 0.6 * min(max(1.5 - np.sqrt(across * across + down * down), 0.0), 1.0)
                 if share == 0.0:
                     continue
-                row = min(max(int(y / 8 + 3 * down), 0), soft.shape[0] - 1)
-                column = min(max(int(x / 8 + 3 * across), 0), soft.shape[1] - 1)
-                bright = 1.0 + 0.25 * min(max(down, -1.0), 1.0)
+                row = min(max(int(y / 8 - 5 * down), 0), soft.shape[0] - 1)
+                column = min(max(int(x / 8 - 5 * across), 0), soft.shape[1] - 1)
+                bright = 1.0 + 0.1 * min(max(down, -1.0), 1.0)
                 for c in range(3):
                     value = image[i, j, c] + share * (bright * soft[row, column, c] - image[i, j, c])
                     image[i, j, c] = np.uint8(min(max(value, 0.0), 255.0))
@@ -175,7 +191,7 @@ class Sensor:
         nearer = 1 / np.maximum(1 - speed / 60 / depth, 0.5) - 1
         dx, dy = (x - self._camera.cx) * nearer, (y - self._camera.cy) * nearer + drop
         layer = np.zeros((height, width), np.uint8)
-        strength = rng.uniform(8, 34, count) * (0.35 if self._light.night else 1.0)
+        strength = rng.uniform(5, 22, count) * (0.35 if self._light.night else 1.0)
         ends = np.stack([x, y, x + dx, y + dy], axis=1)
         for (x0, y0, x1, y1), value in zip(
             np.round(ends * 16).astype(int).tolist(), strength.tolist(), strict=True
@@ -197,10 +213,10 @@ class Sensor:
         size = width / 640 * np.exp(rng.normal(1.5, 0.45, count))
         places = np.stack([rng.uniform(0, width, count), rng.uniform(0, height, count)], axis=1)
         small = cv2.resize(image, (width // 8, height // 8), interpolation=cv2.INTER_AREA)
-        soft = cv2.GaussianBlur(small, (0, 0), 2.0)[::-1]
+        soft = cv2.GaussianBlur(small, (0, 0), 1.2)
         out = image.copy()
         falling = born <= age
-        _refract(out, np.ascontiguousarray(soft), places[falling], size[falling])
+        _refract(out, np.asarray(soft), places[falling], size[falling])
         return out
 
 

@@ -25,12 +25,12 @@ def texture_array() -> NDArray[np.uint8]:
     Row 0 is v = 0, the lower edge. All layers but SIGN, PLATE, TAIL_LAMP, HEAD_LAMP and RUBBER, which
     are shown once a face, repeat without a seam. What the colour and the alpha of a layer mean:
 
-    - PAINT, CARGO: near-white; it multiplies the body's colour. Alpha: gloss.
+    - PAINT, CARGO, FOLIAGE, HILL: pale; they multiply the body's colour. Alpha: gloss.
     - SIGN: four faces, one a quarter (lower left: speed limit, lower right: warning, upper left: direction
       board, upper right: gantry board). Alpha: share of marking; shown is
       ``mix(body colour, texture, alpha)``.
-    - FACADE: alpha is the window mask: 1 on glass, which reflects by day and may be lit at night;
-      4 x 4 windows a repeat.
+    - FACADE: multiplies the body's colour, too. Alpha is the window mask: 1 on glass, which reflects by
+      day and may be lit at night; 4 x 4 windows a repeat.
     - TAIL_LAMP: the plain lens; the glow is the renderer's. Faces with u >= 2 are the high lamp: lit by
       BRAKE only.
     - all others: the albedo itself. Alpha: gloss, 0 dull to 1 a mirror.
@@ -182,15 +182,12 @@ def _cargo(rng: np.random.Generator) -> Floats:
 
 
 def _foliage(rng: np.random.Generator) -> Floats:
-    """Paint leaves: clumps of several greens over dark gaps."""
-    clumps = _fbm(rng, 6, 3, 0.75)
-    leaves = _fbm(rng, 32, 3, 0.8)
-    light = 0.42 + 0.20 * clumps + 0.22 * leaves
-    colour = _tint((0.06, 0.09, 0.04), (0.54, 0.58, 0.29), light)
-    yellow = 0.05 * _fbm(rng, 4, 2)
-    colour += np.stack([yellow, 0.4 * yellow, np.zeros_like(yellow)], axis=-1)
-    colour[(clumps + 0.8 * leaves) < -1.15] = (0.025, 0.035, 0.018)
-    return _layer(colour, 0.05)
+    """Paint leaves: pale, for the plant's colour to tint, with fine grain and dark gaps between twigs."""
+    twigs, leaves = _fbm(rng, 7, 4, 0.8), _fbm(rng, 48, 3, 0.9)
+    light = 0.46 + 0.24 * twigs + 0.16 * leaves
+    colour = _tint((0.22, 0.24, 0.20), (0.94, 0.95, 0.82), light)
+    colour[(twigs + 0.9 * leaves) < -1.25] = (0.10, 0.12, 0.09)
+    return _layer(colour, 0.0)
 
 
 def _bark(rng: np.random.Generator) -> Floats:
@@ -319,10 +316,10 @@ def _asphalt(rng: np.random.Generator) -> Floats:
 
 
 def _hill(rng: np.random.Generator) -> Floats:
-    """Paint a far slope: woods, fields and bare ground."""
+    """Paint a far slope: woods, fields and bare ground, for the hill's colour to tint."""
     cover, detail = _fbm(rng, 5, 5, 0.65), _fbm(rng, 48, 3, 0.8)
-    woods = _tint((0.07, 0.10, 0.05), (0.22, 0.26, 0.13), 0.5 + 0.3 * detail)
-    fields = _tint((0.36, 0.34, 0.19), (0.60, 0.53, 0.34), 0.5 + 0.12 * detail + 0.2 * _fbm(rng, 3, 3))
+    woods = _tint((0.16, 0.20, 0.13), (0.38, 0.42, 0.28), 0.5 + 0.3 * detail)
+    fields = _tint((0.60, 0.58, 0.42), (0.92, 0.86, 0.68), 0.5 + 0.12 * detail + 0.2 * _fbm(rng, 3, 3))
     share = np.clip(0.35 + 1.6 * (cover - 0.2), 0, 1)[..., None]
     return _layer(woods * (1 - share) + fields * share, 0.0)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sim import ego as ego_car
 from sim.drivers import Driver
-from sim.fleet import Fleet
+from sim.fleet import Fleet, Surge
 from sim.indexed_road import IndexedRoad
 from sim.models import Model
 from sim.pace import Pace
@@ -31,6 +31,8 @@ WARM_UP = 8.0
 """Seconds of traffic before tick 0, in which gaps and lanes settle."""
 BRAKE_ON, BRAKE_OFF = -0.8, -0.3
 """M/s^2 below which the brake lamps light up, and above which they go out."""
+EGO_SURGE = 0.1
+"""Amplitude of the swing of the camera car's wanted speed, as a part of it."""
 BRAKE_HOLD = 0.4
 """Seconds that they stay on at least."""
 
@@ -75,7 +77,13 @@ class Traffic:
         self._population = Population(road, params, self._fleet, self._pace, seed=seed)
         warm_up = round(WARM_UP * rate)
         self._tick = -warm_up
+        self._collided = False
         self._profile = ego_car.Profile(ego, stream(seed, "ego", "profile"))
+        self._surge = Surge.draw(
+            stream(seed, "ego", "surge"),
+            strength=EGO_SURGE if ego.driver == "traffic" else 0.0,
+            periods=(14.0, 26.0),
+        )
         self._body = ego_car.Body(ego, rate, stream(seed, "ego", "body"))
         self._population.time = -warm_up / rate
         self._ego_driver = self._population.ego = self._place_ego()
@@ -88,8 +96,8 @@ class Traffic:
 
     @property
     def collided(self) -> bool:
-        """Whether any vehicle has touched another: the drive is then invalid."""
-        return any(v.crashed for v in self._population.world.vehicles)
+        """Whether any vehicle has ever touched another: the drive is then invalid."""
+        return self._collided
 
     def step(self, action: NDArray[np.floating[Any]] | None = None) -> None:
         """Advance one tick.
@@ -104,6 +112,7 @@ class Traffic:
         self._set_speeds()
         self._population.world.act()
         self._population.world.step(dt)
+        self._collided |= any(v.crashed for v in self._population.world.vehicles)
         self._tick += 1
         self._population.time = self._tick / self._rate
         self._population.track()
@@ -172,9 +181,10 @@ class Traffic:
         t = self._tick / self._rate
         for actor in self._population.actors:
             allowed = self._pace.allowed(actor.s, t, same_way=actor.same_way)
-            actor.driver.target_speed = min(actor.driver.desired_speed, allowed)
+            wish = actor.driver.desired_speed * actor.draw.surge.at(t)
+            actor.driver.target_speed = min(wish, allowed)
         me = self._ego_driver
-        wish = self._ego_params.speed
+        wish = self._ego_params.speed * self._surge.at(t)
         if self._ego_params.driver == "profile":
             wish, *weave = self._profile.at(t)
             me.weave = (weave[0], weave[1])
@@ -193,7 +203,7 @@ class Traffic:
         me = self._population.place(drawn if p.lane < 0 else p.lane, True, s, speed, kind)
         me.resize(ego_car.LENGTH, ego_car.WIDTH)
         me.desired_speed = p.speed
-        me.TIME_WANTED, me.COMFORT_ACC_MAX, me.COMFORT_ACC_MIN = 1.2, 1.6, -2.0
-        me.POLITENESS = 0.3
+        me.TIME_WANTED, me.COMFORT_ACC_MAX, me.COMFORT_ACC_MIN = 1.0, 1.6, -2.0
+        me.POLITENESS = 0.1
         me.enable_lane_change = p.driver == "traffic"
         return me

@@ -96,11 +96,13 @@ def _axles(shape: CarShape) -> tuple[float, float]:
 def add_wheels(builder: MeshBuilder, shape: CarShape, detail: int) -> None:
     """Add four wheels and, on the finest mesh, dark wheel arches."""
     half, radius = shape.width / 2, shape.wheel
+    if detail == 0:
+        # From afar wheels and underside are one dark block.
+        (back, ahead), wide = _axles(shape), 0.97 * half
+        box = (back - radius, -wide, 0.0), (ahead + radius, wide, 0.30)
+        builder.box(*box, Surface.PLASTIC, without="+z-z")
+        return
     for x in _axles(shape):
-        if detail == 0:
-            box = (x - radius * 0.8, -half * 0.97, 0.0), (x + radius * 0.8, half * 0.97, radius)
-            builder.box(*box, Surface.PLASTIC, without="+z-z")
-            continue
         for side in (1, -1):
             centre = (x, side * (half - 0.10), radius)
             if detail == 2:

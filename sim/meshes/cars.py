@@ -60,8 +60,8 @@ def _body(builder: MeshBuilder, shape: CarShape, detail: int) -> Floats:
         nose = np.array([0.20, 0.33, 0.50, shape.hood - 0.17, shape.hood - 0.03, shape.hood])
     else:
         stations = [(0.0, 0.97), (shape.length, 0.90)]
-        levels, bulge = np.array([0.20, 0.40, shape.deck]), np.array([0.96, 1.0, 0.94])
-        tuck, nose = np.array([0.04, 0.0, 0.06]), np.array([0.20, 0.36, shape.hood])
+        levels, bulge = np.array([0.26, shape.deck]), np.array([1.0, 0.94])
+        tuck, nose = np.array([0.0, 0.06]), np.array([0.24, shape.hood])
     points = np.zeros((len(stations), len(levels), 3))
     belt = shape.deck - 0.02
     for i, (along, share) in enumerate(stations):
@@ -80,7 +80,8 @@ def _body(builder: MeshBuilder, shape: CarShape, detail: int) -> Floats:
         cowl = shape.length - shape.screen[0]
         points[-3 if detail == 2 else -2, -1, 2] = shape.hood + (belt - shape.hood) * 0.35 * (cowl > 0)
     surfaces = np.full((len(stations) - 1, len(levels) - 1), Surface.PAINT, np.uint8)
-    surfaces[:, 0] = Surface.PLASTIC
+    if detail:
+        surfaces[:, 0] = Surface.PLASTIC
     if detail == 2:
         surfaces[0, 2] = Surface.PLASTIC
         surfaces[:2, 4] = Surface.TAIL_LAMP
@@ -97,14 +98,16 @@ def _body(builder: MeshBuilder, shape: CarShape, detail: int) -> Floats:
     for end, facing in ((0, -1), (-1, 1)):
         strip = np.stack([points[end], mirrored[end]])
         kinds = np.full((1, len(levels) - 1), Surface.PAINT, np.uint8)
-        kinds[0, 0] = Surface.PLASTIC
+        if detail:
+            kinds[0, 0] = Surface.PLASTIC
         if detail == 2:
             kinds[0, 2] = Surface.PLASTIC
         builder.grid(strip, kinds, inside=(points[end, 0, 0] - facing, 0, 0.6))
     top = np.stack([points[:, -1], mirrored[:, -1]], axis=1)
     builder.grid(top, Surface.PAINT, inside=(0, 0, -5))
-    floor = np.stack([points[:, 0], mirrored[:, 0]], axis=1)
-    builder.grid(floor[[0, -1]], Surface.PLASTIC, inside=(0, 0, 5))
+    if detail:
+        floor = np.stack([points[:, 0], mirrored[:, 0]], axis=1)
+        builder.grid(floor[[0, -1]], Surface.PLASTIC, inside=(0, 0, 5))
     return points
 
 
@@ -136,8 +139,8 @@ def _cabin(builder: MeshBuilder, shape: CarShape, detail: int) -> None:
         builder.grid(side, Surface.PAINT, inside=middle)
     for end in (0, 1):
         builder.grid(np.stack([left[:, end], right[:, end]]), Surface.PAINT, inside=middle)
-    ridge = (left[-1] + right[-1]) / 2 + (0, 0, 0.018)
-    builder.grid(np.stack([left[-1], ridge, right[-1]]), Surface.PAINT, inside=middle)
+    ridge = [(left[-1] + right[-1]) / 2 + (0, 0, 0.018)] if detail else []
+    builder.grid(np.stack([left[-1], *ridge, right[-1]]), Surface.PAINT, inside=middle)
     _windows(builder, left, detail)
 
 

@@ -218,7 +218,7 @@ def _rail(builder: MeshBuilder, size: tuple[float, float, float], detail: int) -
             ]
             builder.polygon(quad, Surface.STEEL, facing=(0, sign, 0))
     builder.box((-half, -0.15, low), (half, 0.15, top), Surface.STEEL, without="+y-y-x+x")
-    for x in np.arange(-half + 1.0, half, 2.0) if detail else (-half + 1.0, half - 3.0):
+    for x in np.arange(-half + 1.0, half, 2.0) if detail else (-half + 1.0,):
         builder.box((x - 0.05, -0.07, 0), (x + 0.05, 0.07, low + 0.1), Surface.STEEL, without="-z+z")
 
 

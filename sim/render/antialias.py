@@ -29,7 +29,7 @@ def _walk(
     limit: float,
     longest: int,
 ) -> tuple[int, float]:
-    """Follow an edge one way: return how many pixels it goes on, and how the brightness differs at its end."""
+    """Follow an edge one way: return how many pixels it goes on, and what differs at its end."""
     rows, columns = luma.shape
     end = 0.0
     for length in range(1, longest + 1):

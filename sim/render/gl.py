@@ -15,11 +15,12 @@ from sim.render.context import check, context
 from sim.render.ground import MARGIN, cut, grain_texture, mark_table, road_texture
 from sim.render.instances import COMMAND, CONTACT, INSTANCE, Library, contacts, in_bands
 from sim.render.lamps import HALO, LIGHTS, Burning, LampPlan, halos, lights
+from sim.render.pool import PoolPass
 from sim.render.programs import program, set_uniforms
 from sim.render.silhouettes import SilhouettePass
 from sim.render.sky import HIGHEST, panorama
 from sim.render.types import Picture, Silhouettes, Stage
-from sim.render.view import view_matrices
+from sim.render.view import look_matrix, view_matrices
 from sim.textures import texture_array
 from sim.world import Bodies, WorldState
 
@@ -27,7 +28,8 @@ _ROOM = 8192  # instances and draws in a frame
 
 _SHADOW_REACH = 120.0  # metres within which bodies cast shadows
 _SHADOW_WIDEN = 2.5  # half-widths of the frame within which they do
-_BEAM = 130.0
+_BEAM = 44.0
+_BODY_LIGHTS = 4  # lamps that light bodies, of those that light the ground
 # Share of the body's colour (2: by the texture's alpha), reflection, more by the alpha, retro-reflection.
 _GLOSS = {
     Surface.PAINT: (1.0, 0.055, 0.02, 0.0),
@@ -39,7 +41,9 @@ _GLOSS = {
     Surface.TAIL_LAMP: (0.0, 0.05, 0.0, 0.0),
     Surface.HEAD_LAMP: (0.0, 0.12, 0.0, 3.0),
     Surface.CARGO: (1.0, 0.01, 0.0, 0.0),
-    Surface.FACADE: (0.0, 0.0, 0.25, 0.0),
+    Surface.FOLIAGE: (1.0, 0.0, 0.0, 0.0),
+    Surface.FACADE: (1.0, 0.0, 0.25, 0.0),
+    Surface.HILL: (1.0, 0.0, 0.0, 0.0),
     Surface.SIGN: (2.0, 0.01, 0.0, 25.0),
 }
 
@@ -65,7 +69,7 @@ class GlRenderer:
         self._library = Library(stage.models)
         self._ground = cut(stage.ground)
         self._lamps = LampPlan(stage.models)
-        self._streets = stage.light.night
+        self._streets = stage.light.night and stage.light.street_lamps
         self._things: list[Any] = []
         with context() as ctx:
             self._make_buffers(ctx)
@@ -124,7 +128,11 @@ class GlRenderer:
             self._ground_commands.write(self._ground.commands(stretches))
             draws = (len(commands), len(stretches))
             self._shadow_pass(ctx, view, len(shades), pose)
-            self._light_up(burning, pose)
+            if self._pool is not None:
+                self._light_up(self._pool.program, burning, pose, LIGHTS)
+                self._light_up(self._body, burning, pose, _BODY_LIGHTS)
+                self._pool.draw(ctx, camera, pose)
+                self._pool.use(6, 7)
             self._main_pass(ctx, view, draws)
             self._contact_pass(ctx, view, resting)
             self._sky_pass(ctx, camera, pose)
@@ -160,40 +168,29 @@ class GlRenderer:
         self._land_array.render_indirect(self._ground_commands, count=draws[1], first=draws[1])
 
     def _sky_pass(self, ctx: Any, camera: Camera, pose: Pose) -> None:
-        width, height = self._size
         self._over.use()
         ctx.enable_only(ctx.DEPTH_TEST)
         ctx.depth_func = "<="
-        right, down, ahead = pose.rotation
-        look = np.stack(
-            [
-                right * (0.5 * width / camera.focal),
-                down * (0.5 * height / camera.focal),
-                ahead
-                + right * ((0.5 * width - camera.cx) / camera.focal)
-                + down * ((0.5 * height - camera.cy) / camera.focal),
-            ]
-        )
         self._panorama.use(4)
-        set_uniforms(self._sky, u_look=look.astype("<f4").tobytes(), u_middle=np.arctan2(ahead[1], ahead[0]))
+        ahead = pose.rotation[2]
+        set_uniforms(self._sky, u_look=look_matrix(camera, pose), u_middle=np.arctan2(ahead[1], ahead[0]))
         self._sky_array.render()
         ctx.depth_func = "<"
 
-    def _light_up(self, burning: Burning, pose: Pose) -> None:
+    def _light_up(self, shader: Any, burning: Burning, pose: Pose, most: int) -> None:
         """Set what lamps light at night; the shaders of the day do not have it."""
         shining = lights(burning)
         ahead = pose.rotation[2] * [1, 1, 0]
         ahead /= np.sqrt(ahead @ ahead)
-        for shader in (self._body, self._paved, self._land):
-            set_uniforms(
-                shader,
-                u_lamps=LIGHTS,
-                u_lamp_at=shining.position.tobytes(),
-                u_lamp_colour=shining.colour.tobytes(),
-                u_lamp_aim=shining.aim.tobytes(),
-                u_ahead=tuple(ahead),
-                u_right=(ahead[1], -ahead[0], 0.0),
-            )
+        set_uniforms(
+            shader,
+            u_lamps=min(shining.count, most),
+            u_lamp_at=shining.position.tobytes(),
+            u_lamp_colour=shining.colour.tobytes(),
+            u_lamp_aim=shining.aim.tobytes(),
+            u_ahead=tuple(ahead),
+            u_right=(ahead[1], -ahead[0], 0.0),
+        )
 
     def _contact_pass(self, ctx: Any, view: dict[str, Any], resting: NDArray[np.void]) -> None:
         if not len(resting):
@@ -319,8 +316,8 @@ class GlRenderer:
                 self._faces,
             )
         )
-        self._paved = keep(program(ctx, "ground", "ground", "ROAD", *night, shared=shared))
-        self._land = keep(program(ctx, "ground", "ground", *night, shared=shared))
+        self._paved = keep(program(ctx, "ground", "ground", "ROAD", *night, shared=("light",)))
+        self._land = keep(program(ctx, "ground", "ground", *night, shared=("light",)))
         self._paved_array, self._land_array = (
             keep(
                 ctx.vertex_array(
@@ -348,14 +345,17 @@ class GlRenderer:
             set_uniforms(
                 shader, **lit, u_textures=0, u_grain=1, u_road=2, u_shadow=3, u_panorama=4, u_marks=5
             )
+            set_uniforms(shader, u_pool=6, u_mirror=7)
         table = np.zeros((len(Surface), 4), "<f4")
         for surface, row in _GLOSS.items():
             table[surface] = row
         set_uniforms(self._body, u_material=table.tobytes())
         for shader in (self._paved, self._land):
             set_uniforms(shader, u_paved=stage.ground.paved, u_margin=MARGIN, u_wet=light.wet)
+            set_uniforms(shader, u_frame=tuple(map(float, self._size)))
         set_uniforms(self._sky, u_highest=HIGHEST)
-        for shader in (self._body, self._paved, self._land):
+        self._pool = keep(PoolPass(ctx, self._size, light.wet)) if light.night else None
+        for shader in (self._body, *([self._pool.program] if self._pool is not None else [])):
             set_uniforms(shader, u_beam=_BEAM, u_street=float(self._streets))
         self._halo = keep(program(ctx, "halo", "halo"))
         self._corners = keep(ctx.buffer(np.array([-1, -1, 1, -1, -1, 1, 1, 1], "<f4").tobytes()))

@@ -33,11 +33,13 @@ class Lights:
         position: (LIGHTS, 3) relative to the camera, metres.
         colour: (LIGHTS, 3) irradiance at one metre.
         aim: (LIGHTS, 4) direction of the beam, and the power of its cosine.
+        count: How many there are, the strongest first.
     """
 
     position: NDArray[np.float32]
     colour: NDArray[np.float32]
     aim: NDArray[np.float32]
+    count: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,11 +95,11 @@ class LampPlan:
             forward = np.array([cos, sin, 0.0])
             shown = []
             if lamps & Lamps.BRAKE:
-                shown.append((self._tail[model], -forward, _BRAKE, 1.0, 4.0))
+                shown.append((self._tail[model], -forward, _BRAKE, 1.0, 6.0))
             elif lamps & Lamps.TAIL:
-                shown.append((self._tail[model], -forward, _TAIL, 1.0, 4.0))
+                shown.append((self._tail[model], -forward, _TAIL, 1.0, 5.0))
             if lamps & Lamps.HEAD:
-                shown.append((self._head[model], np.array([cos, sin, -0.05]), _HEAD, 28.0, 60.0))
+                shown.append((self._head[model], np.array([cos, sin, -0.05]), _HEAD, 28.0, 14.0))
             if streets:
                 shown.append((self._street[model], np.array([0.0, 0.0, -1.0]), _STREET, 2.0, 90.0))
             for places, aim, tint, sharpness, reach in shown:
@@ -123,12 +125,13 @@ def lights(burning: Burning) -> Lights:
     worth = burning.strength / (distance + 5.0) ** 2
     rows = np.argsort(-worth, kind="stable")[:LIGHTS]
     rows = rows[distance[rows] < _REACH]
+    count = len(rows)
     out = Lights(
+        count=count,
         position=np.zeros((LIGHTS, 3), np.float32),
         colour=np.zeros((LIGHTS, 3), np.float32),
         aim=np.zeros((LIGHTS, 4), np.float32),
     )
-    count = len(rows)
     out.position[:count] = burning.position[rows]
     out.colour[:count] = burning.colour[rows] * burning.strength[rows, None]
     out.aim[:count, :3] = burning.direction[rows]

@@ -12,15 +12,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from sim.camera import Camera, Pose
-from sim.render.instances import COMMAND, Library, Selection
+from sim.render.instances import Library, Selection
 from sim.render.types import Silhouettes
 from sim.render.view import view_matrices
 from sim.world import Bodies
 
 Ints = NDArray[np.int64]
+Mask = tuple[int, int, NDArray[np.bool_]]
 
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1])
 """The twelve edges of a box, as pairs of the corners that `Library.corners` gives."""
@@ -74,23 +76,60 @@ def layered(boxes: Ints, rows: NDArray[np.intp]) -> list[Drawing]:
         boxes: (N, 4) x0, y0, x1, y1.
         rows: (M,) those to draw.
     """
-    low, high = boxes[:, None, :2], boxes[:, None, 2:]
-    overlap = np.asarray(((low < high.swapaxes(0, 1)) & (high > low.swapaxes(0, 1))).all(axis=-1))
-    layers: list[list[int]] = []
-    taken: list[NDArray[np.bool_]] = []  # by layer: which boxes meet one of its members
-    for row in rows.tolist():
-        layer = next((k for k, meets in enumerate(taken) if not np.asarray(meets)[row]), len(layers))
-        if layer == len(layers):
-            layers.append([])
-            taken.append(np.zeros(len(boxes), bool))
-        layers[layer].append(row)
-        np.logical_or(taken[layer], overlap[row], out=taken[layer])
+    layers = _layers(boxes, rows)
     drawings = []
-    for members in layers:
+    for layer in range(int(layers.max(initial=-1)) + 1):
+        members = rows[layers == layer]
         held = boxes[members]
         area = (*held[:, :2].min(axis=0).tolist(), *held[:, 2:].max(axis=0).tolist())
-        drawings.append(Drawing(rows=np.array(members), area=area))
+        drawings.append(Drawing(rows=members, area=area))
     return drawings
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _layers(boxes: Ints, rows: NDArray[np.intp]) -> Ints:
+    """Return (M,) the first layer in which each of the rows overlaps none of those before it."""
+    layers = np.zeros(rows.size, np.int64)
+    meets = np.zeros(rows.size, np.bool_)
+    for k in range(rows.size):
+        meets[: k + 1] = False
+        x0, y0, x1, y1 = boxes[rows[k]]
+        for other in range(k):
+            a, b, c, d = boxes[rows[other]]
+            if x0 < c and a < x1 and y0 < d and b < y1:
+                meets[layers[other]] = True
+        while meets[layers[k]]:
+            layers[k] += 1
+    return layers
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _measure(
+    picture: NDArray[np.uint16], x: int, y: int, boxes: Ints, rows: NDArray[np.intp], hole: Ints, out: Ints
+) -> None:
+    """Count each row's pixels within its box and find the tightest box around them.
+
+    Args:
+        picture: Part of the target, each pixel the row that covers it plus one.
+        x: Where the part's upper left corner lies in the target.
+        y: The same, downward.
+        boxes: (N, 4) x0, y0, x1, y1 in the target.
+        rows: (M,) those drawn.
+        hole: (4,) x0, y0, x1, y1 in the target: what lies in it does not count.
+        out: (N, 5) takes the count and x0, y0, x1, y1 in the target; no change if the count is 0.
+    """
+    for row in rows:
+        x0, y0, x1, y1 = boxes[row]
+        count, left, top, right, bottom = 0, x1, y1, x0, y0
+        for i in range(y0, y1):
+            in_hole = hole[1] <= i < hole[3]
+            for j in range(x0, x1):
+                if picture[i - y, j - x] == row + 1 and not (in_hole and hole[0] <= j < hole[2]):
+                    count += 1
+                    left, right = min(left, j), max(right, j + 1)
+                    top, bottom = min(top, i), max(bottom, i + 1)
+        if count:
+            out[row, 0], out[row, 1], out[row, 2], out[row, 3], out[row, 4] = count, left, top, right, bottom
 
 
 class SilhouettePass:
@@ -146,20 +185,22 @@ class SilhouettePass:
         wide = replace(
             camera, width=3 * width, height=3 * height, cx=camera.cx + width, cy=camera.cy + height
         )
-        jobs += [(self._wide, wide, boxes + shift, drawing) for drawing in layered(boxes + shift, outside)]
+        # To the left and to the right apart: between them lies the frame, which nobody asks for here.
+        left = boxes[outside, 0] + boxes[outside, 2] < width
+        for side in (outside[left], outside[~left]):
+            jobs += [(self._wide, wide, boxes + shift, drawing) for drawing in layered(boxes + shift, side)]
+        within, beyond = np.zeros((count, 5), np.int64), np.zeros((count, 5), np.int64)
         if not jobs:
-            return _counted(vehicles.ids[selection.rows], {}, {}, count)
-
+            return _counted(vehicles.ids[selection.rows], within, beyond, {})
         order = np.concatenate([drawing.rows for *_, drawing in jobs])
-        commands, spans = _commands(library, selection.meshes, [drawing.rows for *_, drawing in jobs])
         self._instances.write(instances[order])
-        self._commands.write(commands)
-        found: dict[int, tuple[int, int, NDArray[np.bool_]]] = {}
-        beyond: dict[int, tuple[int, int, NDArray[np.bool_]]] = {}
+        self._commands.write(library.single_commands(selection.meshes[order]))
+        first = 0
+        masks: dict[int, Mask] = {}
         ctx.enable_only(ctx.CULL_FACE)
         ctx.front_face = "cw"
         current = None
-        for (target, view, held, drawing), (first, draws) in zip(jobs, spans, strict=True):
+        for target, view, held, drawing in jobs:
             if target is not current:
                 target.use()
                 shader["u_clip"].write(view_matrices(view, pose)["u_clip"])
@@ -168,63 +209,38 @@ class SilhouettePass:
             area = (x0, y0, x1 - x0, y1 - y0)
             target.clear(viewport=area)
             ctx.scissor = area
-            self._array.render_indirect(self._commands, count=draws, first=first)
+            self._array.render_indirect(self._commands, count=len(drawing.rows), first=first)
+            first += len(drawing.rows)
             ctx.scissor = None
             raw = target.read(viewport=area, components=1, dtype="u2", alignment=1)
             picture = np.frombuffer(raw, np.uint16).reshape(y1 - y0, x1 - x0)
-            for row in drawing.rows.tolist():
-                a, b, c, d = held[row].tolist()
-                mask = picture[b - y0 : d - y0, a - x0 : c - x0] == row + 1
-                if target is self._frame:
-                    found[row] = _trimmed(b, a, mask)
-                else:
-                    mask[
-                        max(height - b, 0) : max(2 * height - b, 0), max(width - a, 0) : max(2 * width - a, 0)
-                    ] = False
-                    beyond[row] = _trimmed(b - height, a - width, mask)
-        return _counted(vehicles.ids[selection.rows], found, beyond, count)
+            if target is not self._frame:
+                hole = np.array([width, height, 2 * width, 2 * height])
+                _measure(picture, x0, y0, held, drawing.rows, hole, beyond)
+                continue
+            _measure(picture, x0, y0, held, drawing.rows, np.zeros(4, np.int64), within)
+            for row, (pixels, a, b, c, d) in zip(
+                drawing.rows.tolist(), within[drawing.rows].tolist(), strict=True
+            ):
+                if pixels:
+                    masks[row] = (b, a, picture[b - y0 : d - y0, a - x0 : c - x0] == row + 1)
+        beyond[:, 1:] -= shift[[0, 1, 0, 1]]
+        return _counted(vehicles.ids[selection.rows], within, beyond, masks)
 
 
-def _commands(
-    library: Library, meshes: NDArray[np.int32], drawings: list[NDArray[np.intp]]
-) -> tuple[NDArray[np.void], list[tuple[int, int]]]:
-    """Return the commands of all drawings, and of each drawing the first and how many."""
-    parts, spans, base, first = [], [], 0, 0
-    for rows in drawings:
-        part = library.commands(meshes[rows])
-        part["base_instance"] += base
-        parts.append(part)
-        spans.append((first, len(part)))
-        base += len(rows)
-        first += len(part)
-    return np.concatenate(parts).astype(COMMAND), spans
-
-
-def _trimmed(row: int, column: int, mask: NDArray[np.bool_]) -> tuple[int, int, NDArray[np.bool_]]:
-    """Cut a mask to what is set in it."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
-        return row, column, np.zeros((0, 0), bool)
-    y0, y1, x0, x1 = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
-    return row + int(y0), column + int(x0), mask[y0:y1, x0:x1]
-
-
-def _counted(
-    ids: NDArray[np.uint32],
-    found: dict[int, tuple[int, int, NDArray[np.bool_]]],
-    beyond: dict[int, tuple[int, int, NDArray[np.bool_]]],
-    count: int,
-) -> Silhouettes:
-    nothing = (0, 0, np.zeros((0, 0), bool))
-    pixels, full = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    boxes = np.full((count, 4), np.nan)
-    masks = tuple(found.get(row, nothing) for row in range(count))
-    for row in range(count):
-        parts = [part for part in (masks[row], beyond.get(row, nothing)) if part[2].size]
-        pixels[row] = np.count_nonzero(masks[row][2])
-        full[row] = sum(np.count_nonzero(part[2]) for part in parts)
-        if parts:
-            boxes[row, :2] = min(part[1] for part in parts), min(part[0] for part in parts)
-            boxes[row, 2] = max(part[1] + part[2].shape[1] for part in parts)
-            boxes[row, 3] = max(part[0] + part[2].shape[0] for part in parts)
-    return Silhouettes(ids=ids, pixels=pixels, pixels_full=full, boxes=boxes, masks=masks)
+def _counted(ids: NDArray[np.uint32], within: Ints, beyond: Ints, masks: dict[int, Mask]) -> Silhouettes:
+    """Put together what was counted inside the frame and beyond it, (N, 5) each as `_measure` gives it."""
+    nothing: Mask = (0, 0, np.zeros((0, 0), bool))
+    both = np.stack([within, beyond])
+    empty = both[..., :1] == 0
+    low = np.where(empty, np.inf, both[..., 1:3]).min(axis=0)
+    high = np.where(empty, -np.inf, both[..., 3:]).max(axis=0)
+    boxes = np.concatenate([low, high], axis=1)
+    boxes[np.isinf(low[:, 0])] = np.nan
+    return Silhouettes(
+        ids=ids,
+        pixels=within[:, 0],
+        pixels_full=both[..., 0].sum(axis=0),
+        boxes=boxes,
+        masks=tuple(masks.get(row, nothing) for row in range(len(ids))),
+    )

@@ -28,3 +28,20 @@ def view_matrices(camera: Camera, pose: Pose) -> dict[str, Any]:
     turned[:3, :3] = pose.rotation
     clip = projection @ turned
     return {"u_clip": clip.T.astype("<f4").tobytes(), "u_forward": tuple(pose.rotation[2])}
+
+
+def look_matrix(camera: Camera, pose: Pose) -> bytes:
+    """Return a view's uniform ``u_look``.
+
+    Its columns are what a unit of clip space's x, one of its y, and its middle add to a pixel's direction in
+    the world.
+    """
+    right, down, ahead = pose.rotation
+    width, height = camera.width, camera.height
+    middle = (
+        ahead
+        + right * ((0.5 * width - camera.cx) / camera.focal)
+        + down * ((0.5 * height - camera.cy) / camera.focal)
+    )
+    look = np.stack([right * (0.5 * width / camera.focal), down * (0.5 * height / camera.focal), middle])
+    return look.astype("<f4").tobytes()

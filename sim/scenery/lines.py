@@ -69,7 +69,7 @@ def _posts(
             yard.add(name, float(s), d, turn=turn, colour=SIGNS.get(name, GREY))
 
 
-def place_lines(yard: Yard, night: bool) -> None:
+def place_lines(yard: Yard, lit: bool) -> None:
     """Place rails, walls, fences, lamp posts, delineators and gantries."""
     road, params = yard.road, yard.params
     low, high = road.paved
@@ -90,14 +90,14 @@ def place_lines(yard: Yard, night: bool) -> None:
         _line(yard, "fence", edge + out * plan.fence_away, fences & ~walls)
         if params.density == 0:
             continue
-        if params.setting == "urban" or (params.setting == "motorway" and night):
+        if params.setting == "urban" or (params.setting == "motorway" and lit):
             name = "lamp-post-a" if params.setting == "motorway" else "lamp-post-b"
             # Towns are lit throughout, motorways at junctions only, on both sides at once.
             posts = int(road.length / LAMP_SPACING) + 1
             share = 1.0 if params.setting == "urban" else LIT_SHARE
-            lit = _stretches(yard.stream("lit"), posts, share, 9)
+            shining = _stretches(yard.stream("lit"), posts, share, 9)
             away, first = yard.size(name)[1] / 2 + 0.4, 0.3 if side == "right" else 0.8
-            _posts(yard, name, edge + out * away, LAMP_SPACING, turn=inward, first=first, flags=lit)
+            _posts(yard, name, edge + out * away, LAMP_SPACING, turn=inward, first=first, flags=shining)
         if params.setting == "motorway":
             _posts(yard, "delineator", edge + out * 0.45, 50.0, turn=inward)
         elif params.setting == "rural":

@@ -16,7 +16,7 @@ from sim.world import Bodies
 
 
 def place_scenery(
-    road: InCarRoad, params: SceneryParams, night: bool, catalogue: Sequence[Model], seed: int
+    road: InCarRoad, params: SceneryParams, lit: bool, catalogue: Sequence[Model], seed: int
 ) -> Bodies:
     """Place everything that stands beside a road.
 
@@ -28,7 +28,7 @@ def place_scenery(
     Args:
         road: Where.
         params: What and how much.
-        night: Whether motorways too are lined with lamp posts in stretches.
+        lit: Whether motorways too are lined with lamp posts in stretches; towns always are.
         catalogue: Models to choose from, by name.
         seed: Of the episode.
 
@@ -39,6 +39,6 @@ def place_scenery(
     bridges = place_bridges(yard)
     for species in SPECIES:
         scatter(yard, species, bridges)
-    place_lines(yard, night)
+    place_lines(yard, lit)
     place_horizon(yard)
     return yard.bodies()

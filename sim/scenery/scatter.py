@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.params import SceneryParams
 from sim.roads import InCarRoad
-from sim.scenery.settings import MODELS, SETTINGS, SIGNS, WALLS
+from sim.scenery.settings import MODELS, NEEDLES, SETTINGS, SIGNS, WALLS
 from sim.scenery.yard import MARGIN, Yard
 
 Floats = NDArray[np.float64]
@@ -109,7 +109,7 @@ def scatter(yard: Yard, species: str, bridges: Floats) -> None:
             ):
                 continue
             built.append((float(s), float(d), float(size[0]), float(size[1])))
-        yard.add(name, float(s), float(d), turn=turn, size=size, colour=_colour(name, roll))
+        yard.add(name, float(s), float(d), turn=turn, size=size, colour=_colour(yard, name, roll))
 
 
 def _choose(
@@ -134,11 +134,15 @@ def _choose(
     return name, size, facing
 
 
-def _colour(name: str, roll: Floats) -> ArrayLike:
+def _colour(yard: Yard, name: str, roll: Floats) -> ArrayLike:
     """Pick the paint of a piece."""
     if name in SIGNS:
         base = np.array(SIGNS[name])
         if name in ("sign-direction", "sign-motorway") and roll[6] < 0.4:
             base = np.array([0.05, 0.18, 0.45])
         return base
+    if name.startswith("conifer"):
+        return np.asarray(np.array(NEEDLES) * (0.88 + 0.24 * roll[7]))
+    if name.startswith(("broadleaf", "bush")):
+        return yard.leaves(float(roll[6]), float(roll[7]))
     return np.asarray(WALLS[int(roll[6] * len(WALLS))] * (0.85 + 0.3 * roll[7])).clip(0, 1)

@@ -73,7 +73,7 @@ MODELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "bush": ("bush-a", "bush-b", "bush-c"),
         "sign": ("sign-motorway", "sign-direction", "sign-speed", "sign-diamond"),
         "pole": ("pole-a", "delineator"),
-        "building": ("hall", "barn", "house-b"),
+        "building": ("hall", "barn", "house-b", "offices"),
     },
     "rural": {
         "tree": ("broadleaf-a", "broadleaf-b", "broadleaf-c", "broadleaf-e", "broadleaf-d", "conifer-a"),
@@ -87,13 +87,49 @@ MODELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "bush": ("bush-a", "bush-c"),
         "sign": ("sign-direction", "sign-speed", "sign-warning", "sign-diamond"),
         "pole": ("pole-b", "delineator"),
-        "building": ("block-a", "block-b", "block-c", "house-a", "house-b", "house-c"),
+        "building": (
+            "shops-a",
+            "flats-a",
+            "block-a",
+            "house-a",
+            "shops-b",
+            "offices",
+            "block-b",
+            "house-c",
+            "flats-b",
+            "shops-a",
+            "block-c",
+            "house-b",
+        ),
     },
 }
 
 WALLS = np.array(
-    [(0.86, 0.82, 0.72), (0.80, 0.74, 0.66), (0.72, 0.55, 0.45), (0.85, 0.85, 0.83), (0.62, 0.60, 0.57)]
+    [
+        (1.0, 0.96, 0.86),
+        (0.96, 0.88, 0.76),
+        (0.84, 0.60, 0.48),
+        (1.0, 1.0, 1.0),
+        (0.80, 0.80, 0.80),
+        (0.98, 0.86, 0.62),
+        (0.74, 0.82, 0.88),
+    ]
 )
+"""Paints of walls, over the facade's own pale plaster."""
+
+LEAVES = np.array(
+    [
+        (0.58, 0.62, 0.38),
+        (0.54, 0.60, 0.39),
+        (0.62, 0.62, 0.46),
+        (0.70, 0.66, 0.38),
+        (0.50, 0.56, 0.40),
+        (0.72, 0.62, 0.44),
+    ]
+)
+"""Hues of leaves, over a pale texture: oak, fresh, grey like olives, yellowing, dark, dry."""
+
+NEEDLES = (0.46, 0.54, 0.40)
 SIGNS = {
     "sign-speed": (0.93, 0.93, 0.91),
     "sign-warning": (0.90, 0.90, 0.86),

@@ -11,6 +11,7 @@ from sim.models import Model
 from sim.params import SceneryParams
 from sim.rng import stream
 from sim.roads import InCarRoad
+from sim.scenery.settings import LEAVES
 from sim.world import FIRST_SCENERY_ID, Bodies, Lamps, Role
 
 Floats = NDArray[np.float64]
@@ -30,11 +31,22 @@ class Yard:
         self.seed = seed
         self.catalogue = catalogue
         self.index = {model.name: i for i, model in enumerate(catalogue)}
+        # A drive shows a few hues of leaves only, and all of them moister or drier.
+        rng = self.stream("leaves")
+        self._hues = LEAVES[rng.permutation(len(LEAVES))[:3]] * rng.uniform(
+            (0.90, 0.92, 0.85), (1.12, 1.05, 1.1)
+        )
         self._rows: list[tuple[int, float, float, float, Floats, Floats]] = []
 
     def stream(self, *names: str | int) -> np.random.Generator:
         """Return the stream of one purpose."""
         return stream(self.seed, "scenery", *names)
+
+    def leaves(self, pick: float, shade: float) -> Floats:
+        """Return the colour of a plant's leaves by two numbers in [0, 1)."""
+        # The first hue is the commonest.
+        hue = self._hues[int(len(self._hues) * pick**1.5)]
+        return np.asarray(hue * (0.86 + 0.28 * shade)).clip(0, 1)
 
     def size(self, name: str) -> Floats:
         """Return a model's own size."""

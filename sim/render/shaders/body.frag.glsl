@@ -64,7 +64,7 @@ void main() {
     glint *= glint * min(8.0 * gloss, 1.0);
 #ifdef NIGHT
     float beam = own_beam(v_at, normal);
-    light += lamplight(v_at, normal) + beam * vec3(1.0, 0.93, 0.8) * (1.0 + material.w);
+    light += lamplight(v_at, normal, 60.0) + beam * vec3(1.0, 0.86, 0.68) * (1.0 + material.w);
 #endif
     vec3 colour = mix(albedo * light, world, reflection) + glint * u_sun_colour + glow(surface, plain, texel.a);
     o_colour = vec4(film(hazed(colour, distance)), 1.0);

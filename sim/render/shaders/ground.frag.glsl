@@ -4,6 +4,11 @@ uniform sampler2D u_shadow;
 uniform float u_wet;
 uniform vec3 u_forward;
 uniform vec2 u_paved;
+#ifdef NIGHT
+uniform sampler2D u_pool;  // light of lamps, and of the own beam
+uniform sampler2D u_mirror;
+uniform vec2 u_frame;
+#endif
 #ifdef ROAD
 uniform sampler2D u_road;
 uniform sampler2D u_marks;  // by offset: middle of the nearest line, its half width, 1 if dashed, 1 if yellow
@@ -52,8 +57,9 @@ void main() {
     float shadow = 1.0 - texelFetch(u_shadow, ivec2(gl_FragCoord.xy), 0).r;
     vec3 light = u_sun_colour * (max(u_sun.z, 0.0) * shadow) + 0.5 * (u_zenith + u_horizon);
 #ifdef NIGHT
-    float beam = own_beam(v_at, mix(vec3(0.0, 0.0, 1.0), -view, 0.05));
-    light += lamplight(v_at, vec3(0.0, 0.0, 1.0)) + beam * vec3(1.0, 0.93, 0.8) * (1.0 + 3.0 * road_mark);
+    vec2 place = gl_FragCoord.xy / u_frame;
+    vec4 pool = textureLod(u_pool, place, 0.0);
+    light += pool.rgb + pool.a * vec3(1.0, 0.86, 0.68) * (1.0 + 7.0 * road_mark);
 #endif
     vec3 colour = albedo * light;
     // A wet road is darker and mirrors at grazing angles; water gathers in the wheel tracks.
@@ -62,7 +68,7 @@ void main() {
     float mirrored = film_of_water * (0.03 + 0.75 * grazing * grazing * grazing);
     colour = mix(colour * (1.0 - 0.45 * film_of_water), mix(u_horizon, u_zenith, 0.25), mirrored);
 #ifdef NIGHT
-    colour += lampmirror(v_at, view, mix(60.0, 240.0, u_wet)) * (0.004 + 0.10 * film_of_water);
+    colour += textureLod(u_mirror, place, 0.0).rgb * (0.004 + 0.10 * film_of_water);
 #endif
     o_colour = vec4(film(hazed(colour, distance)), 1.0);
     o_id = 1u;

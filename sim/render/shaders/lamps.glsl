@@ -9,21 +9,24 @@ uniform vec3 u_right;
 uniform float u_beam;
 
 // Light of the own low beam that falls on a surface: cut off just below level, a little higher on the near side.
+// Below, it falls off steeply: the road is dark before the bonnet and brightest some twenty metres ahead.
 float own_beam(vec3 at, vec3 normal) {
     vec3 from = vec3(dot(at, u_right), at.z + 0.55, dot(at, u_ahead) - 1.0);
     float reach = max(length(from), 1.0);
     float aside = from.x / max(from.z, 0.1), up = from.y / max(from.z, 0.1);
     float cut = -0.012 + 0.03 * clamp(aside * 4.0, 0.0, 1.0);
     float below = 1.0 - smoothstep(cut - 0.012, cut + 0.012, up);
-    float spread = exp(-aside * aside * 7.0) * exp(min(up - cut, 0.0) * 5.0);
+    float spread = exp(min(up - cut, 0.0) * 34.0 - aside * aside * 7.0);
     float lobe = spread * mix(0.045, 1.0, below) * step(0.0, from.z);
     float facing = max(-dot(normal, at) / length(at), 0.0);
     return u_beam * lobe * facing / (reach * reach);
 }
 
-vec3 lamplight(vec3 at, vec3 normal) {
+// Nothing beyond `within` metres of the camera.
+vec3 lamplight(vec3 at, vec3 normal, float within) {
     vec3 sum = vec3(0.0);
-    for (int i = 0; i < u_lamps; i++) {
+    int count = dot(at, at) < within * within ? u_lamps : 0;
+    for (int i = 0; i < count; i++) {
         vec3 away = at - u_lamp_at[i];
         float square = dot(away, away) + 0.3;
         vec3 ray = away * inversesqrt(square);
