@@ -53,6 +53,7 @@ class PointStore:
         self._memory = memory
         self._last: NDArray[np.uint8] | None = None
         self._next_id = 1
+        self._turn = 1
         self.ids = np.zeros(0, np.int64)
         self.position = np.zeros((0, 2))
         self.flow = np.zeros((0, 2))
@@ -134,29 +135,37 @@ class PointStore:
         Sparsely above the horizon, densely where far vehicles lie, then the road.
         """
         height, width = grey.shape
-        top = int(np.clip(horizon - 0.13 * width, 0, height - 24))
+        top = int(np.clip(horizon - 0.10 * width, 0, height - 24))
         near = int(np.clip(horizon - 0.025 * width, top + 8, height - 16))
         road = int(np.clip(horizon + 0.09 * width, near + 8, height - 8))
         bottom = int(np.clip(horizon + 0.30 * width, road + 8, height))
-        response = corner_response(grey[top:bottom])
+        # The middle every other frame, the others in between by turns: a search costs more than to follow.
+        self._turn = (self._turn + 1) % 4
+        if self._turn % 2 == 0:
+            self._search(grey, near, road, 7, 180)
+        elif self._turn == 1:
+            self._search(grey, road, bottom, 18, 90)
+        else:
+            self._search(grey, top, near, 24, 50)
+
+    def _search(self, grey: NDArray[np.uint8], first: int, last: int, cell: int, quota: int) -> None:
+        """Add the best corners of free cells in rows [first, last) until there are ``quota`` points."""
+        rows = self.position[:, 1].astype(np.int64) - first
+        inside = (rows >= 0) & (rows < last - first)
+        held = int(inside.sum())
+        if held >= quota:
+            return
+        response = corner_response(grey[first:last])
         taken = np.zeros(response.shape, np.uint8)
-        columns = np.clip(self.position[:, 0].astype(np.int64), 0, width - 1)
-        rows = self.position[:, 1].astype(np.int64) - top
-        inside = (rows >= 0) & (rows < len(taken))
-        taken[rows[inside], columns[inside]] = 1
+        taken[rows[inside], np.clip(self.position[inside, 0].astype(np.int64), 0, grey.shape[1] - 1)] = 1
         # A corner has to stand out from the noise and the texture of its part of the picture.
         least = float(np.clip(6.0 * np.median(response[::4, ::4]), 1e-4, 4e-4))
-        for first, last, cell, quota in ((top, near, 24, 70), (near, road, 7, 200), (road, bottom, 18, 120)):
-            held = int(((self.position[:, 1] >= first) & (self.position[:, 1] < last)).sum())
-            if held >= quota:
-                continue
-            part = slice(first - top, last - top)
-            corners = find_corners(response[part], taken[part], cell, least, 4 * quota)
-            if held + len(corners) > quota:
-                # The strongest of those there is room for.
-                strength = response[part][corners[:, 1].astype(np.int64), corners[:, 0].astype(np.int64)]
-                corners = corners[np.sort(np.argsort(-strength, kind="stable")[: quota - held])]
-            self._add(corners.astype(np.float64) + np.array([0.5, 0.5 + first]))
+        corners = find_corners(response, taken, cell, least, 4 * quota)
+        if held + len(corners) > quota:
+            # The strongest of those there is room for.
+            strength = response[corners[:, 1].astype(np.int64), corners[:, 0].astype(np.int64)]
+            corners = corners[np.sort(np.argsort(-strength, kind="stable")[: quota - held])]
+        self._add(corners.astype(np.float64) + np.array([0.5, 0.5 + first]))
 
     def drop(self, gone: NDArray[np.bool_]) -> None:
         """Give up points (N,)."""
