@@ -12,7 +12,9 @@ from tracker.in_car.features import corner_response, find_corners
 Floats = NDArray[np.float64]
 
 WINDOW = (11, 11)
-LEVELS = 2
+LEVELS = 1
+# Rows beyond the outermost points that are looked at.
+MARGIN = 24
 
 
 @njit(cache=True)
@@ -74,21 +76,25 @@ class PointStore:
             residual: Greatest mean difference of the two windows, grey levels.
         """
         if len(self) and self._last is not None:
-            start = (self.position - 0.5).astype(np.float32)[:, None]
+            height, width = grey.shape
+            # Only the rows where points are.
+            top = max(0, int(self.position[:, 1].min()) - MARGIN)
+            bottom = min(height, int(self.position[:, 1].max()) + MARGIN)
+            corner = np.array([0.5, 0.5 + top])
+            start = (self.position - corner).astype(np.float32)[:, None]
             guess = start + self.flow.astype(np.float32)[:, None]
             moved, found, error = cv2.calcOpticalFlowPyrLK(
-                self._last,
-                grey,
+                self._last[top:bottom],
+                grey[top:bottom],
                 start,
                 guess,
                 winSize=WINDOW,
                 maxLevel=LEVELS,
-                criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 10, 0.02),
+                criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 8, 0.03),
                 flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
                 minEigThreshold=1e-4,
             )
-            place = moved[:, 0].astype(np.float64) + 0.5
-            height, width = grey.shape
+            place = moved[:, 0].astype(np.float64) + corner
             inside = (place > 3.0).all(1) & (place[:, 0] < width - 3.0) & (place[:, 1] < height - 3.0)
             good = (found[:, 0] == 1) & inside & (error[:, 0] < residual)
             # A flow that jumps is a window that slipped onto something else.
