@@ -31,7 +31,7 @@ WALK = 3.0
 ON_GROUND, ABOVE = 0.45, 1.0
 # Land is not flat: share of static points that lie farther than the flat ground at their row, at the horizon
 # and far below it, and the px below it over which the one goes over into the other.
-RISING, FLAT, RISE_ROWS = 0.35, 0.03, 10.0
+RISING, FLAT, RISE_ROWS = 0.2, 0.02, 7.0
 # Least and greatest distance of what stands at or above the horizon, metres.
 NEAR, FAR = 6.0, 1000.0
 
