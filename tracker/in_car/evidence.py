@@ -29,9 +29,6 @@ WALK = 3.0
 # Static: share of points on the ground itself; those above it follow an exponential in e / (g y) - 1 with
 # this mean.
 ON_GROUND, ABOVE = 0.45, 1.0
-# Land is not flat: share of static points that lie farther than the flat ground at their row, at the horizon
-# and far below it, and the px below it over which the one goes over into the other.
-RISING, FLAT, RISE_ROWS = 0.2, 0.02, 7.0
 # Least and greatest distance of what stands at or above the horizon, metres.
 NEAR, FAR = 6.0, 1000.0
 
@@ -89,12 +86,6 @@ def log_ratios(x, y, dx, dy, seconds, speed, ground, focal, turn, noise, horizon
             static = ON_GROUND * _gauss(rate - least, sigma) + (1 - ON_GROUND) * _tail_exponential(
                 rate - least, sigma, mean
             )
-            # Farther than that: any rate from that of the farthest things up.
-            rising = FLAT + (RISING - FLAT) * math.exp(-y[i] / RISE_ROWS)
-            low = math.erf((rate - speed / FAR) / (1.4142135623730951 * sigma))
-            high = math.erf((rate - least) / (1.4142135623730951 * sigma))
-            beyond = max(0.5 * (low - high), 0.0) / max(least - speed / FAR, 0.25 * least + 1e-4)
-            static = (1.0 - rising) * static + rising * beyond
         else:
             # Depth between FAR and NEAR, 1/Z spread as an exponential above its least value.
             least = speed / FAR
