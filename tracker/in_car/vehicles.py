@@ -198,8 +198,8 @@ class VehicleStore:
         )
         # Within a clear outline it matters little where the points lie and what moves alike around it.
         doubt = self._ill_filled(vehicle, points) + self._alike(vehicle, points)
-        gain -= doubt * max(1.0 - vehicle.clear, 0.0) / (self._rate * CORRELATION)
-        gain += float(np.clip(2.0 * (vehicle.clear - 0.4), -1.0, 0.5)) / (self._rate * CORRELATION)
+        gain -= doubt / (self._rate * CORRELATION)
+        gain += float(np.clip(2.0 * (vehicle.clear - 0.4), -1.0, 0.0)) / (self._rate * CORRELATION)
         vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
         if (
             vehicle.odds > CONFIRM
