@@ -12,7 +12,9 @@ from tracker.in_car.features import corner_response, find_corners
 Floats = NDArray[np.float64]
 
 WINDOW = (11, 11)
-LEVELS = 2
+LEVELS = 1
+# Rows beyond the outermost points that are looked at.
+MARGIN = 24
 
 
 @njit(cache=True)
@@ -53,6 +55,7 @@ class PointStore:
         self._memory = memory
         self._last: NDArray[np.uint8] | None = None
         self._next_id = 1
+        self._turn = 1
         self.ids = np.zeros(0, np.int64)
         self.position = np.zeros((0, 2))
         self.flow = np.zeros((0, 2))
@@ -73,21 +76,25 @@ class PointStore:
             residual: Greatest mean difference of the two windows, grey levels.
         """
         if len(self) and self._last is not None:
-            start = (self.position - 0.5).astype(np.float32)[:, None]
+            height, width = grey.shape
+            # Only the rows where points are.
+            top = max(0, int(self.position[:, 1].min()) - MARGIN)
+            bottom = min(height, int(self.position[:, 1].max()) + MARGIN)
+            corner = np.array([0.5, 0.5 + top])
+            start = (self.position - corner).astype(np.float32)[:, None]
             guess = start + self.flow.astype(np.float32)[:, None]
             moved, found, error = cv2.calcOpticalFlowPyrLK(
-                self._last,
-                grey,
+                self._last[top:bottom],
+                grey[top:bottom],
                 start,
                 guess,
                 winSize=WINDOW,
                 maxLevel=LEVELS,
-                criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 10, 0.02),
+                criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 8, 0.03),
                 flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
                 minEigThreshold=1e-4,
             )
-            place = moved[:, 0].astype(np.float64) + 0.5
-            height, width = grey.shape
+            place = moved[:, 0].astype(np.float64) + corner
             inside = (place > 3.0).all(1) & (place[:, 0] < width - 3.0) & (place[:, 1] < height - 3.0)
             good = (found[:, 0] == 1) & inside & (error[:, 0] < residual)
             # A flow that jumps is a window that slipped onto something else.
@@ -134,29 +141,37 @@ class PointStore:
         Sparsely above the horizon, densely where far vehicles lie, then the road.
         """
         height, width = grey.shape
-        top = int(np.clip(horizon - 0.13 * width, 0, height - 24))
+        top = int(np.clip(horizon - 0.10 * width, 0, height - 24))
         near = int(np.clip(horizon - 0.025 * width, top + 8, height - 16))
         road = int(np.clip(horizon + 0.09 * width, near + 8, height - 8))
         bottom = int(np.clip(horizon + 0.30 * width, road + 8, height))
-        response = corner_response(grey[top:bottom])
+        # The middle every other frame, the others in between by turns: a search costs more than to follow.
+        self._turn = (self._turn + 1) % 4
+        if self._turn % 2 == 0:
+            self._search(grey, near, road, 7, 180)
+        elif self._turn == 1:
+            self._search(grey, road, bottom, 18, 90)
+        else:
+            self._search(grey, top, near, 24, 50)
+
+    def _search(self, grey: NDArray[np.uint8], first: int, last: int, cell: int, quota: int) -> None:
+        """Add the best corners of free cells in rows [first, last) until there are ``quota`` points."""
+        rows = self.position[:, 1].astype(np.int64) - first
+        inside = (rows >= 0) & (rows < last - first)
+        held = int(inside.sum())
+        if held >= quota:
+            return
+        response = corner_response(grey[first:last])
         taken = np.zeros(response.shape, np.uint8)
-        columns = np.clip(self.position[:, 0].astype(np.int64), 0, width - 1)
-        rows = self.position[:, 1].astype(np.int64) - top
-        inside = (rows >= 0) & (rows < len(taken))
-        taken[rows[inside], columns[inside]] = 1
+        taken[rows[inside], np.clip(self.position[inside, 0].astype(np.int64), 0, grey.shape[1] - 1)] = 1
         # A corner has to stand out from the noise and the texture of its part of the picture.
         least = float(np.clip(6.0 * np.median(response[::4, ::4]), 1e-4, 4e-4))
-        for first, last, cell, quota in ((top, near, 24, 70), (near, road, 7, 200), (road, bottom, 18, 120)):
-            held = int(((self.position[:, 1] >= first) & (self.position[:, 1] < last)).sum())
-            if held >= quota:
-                continue
-            part = slice(first - top, last - top)
-            corners = find_corners(response[part], taken[part], cell, least, 4 * quota)
-            if held + len(corners) > quota:
-                # The strongest of those there is room for.
-                strength = response[part][corners[:, 1].astype(np.int64), corners[:, 0].astype(np.int64)]
-                corners = corners[np.sort(np.argsort(-strength, kind="stable")[: quota - held])]
-            self._add(corners.astype(np.float64) + np.array([0.5, 0.5 + first]))
+        corners = find_corners(response, taken, cell, least, 4 * quota)
+        if held + len(corners) > quota:
+            # The strongest of those there is room for.
+            strength = response[corners[:, 1].astype(np.int64), corners[:, 0].astype(np.int64)]
+            corners = corners[np.sort(np.argsort(-strength, kind="stable")[: quota - held])]
+        self._add(corners.astype(np.float64) + np.array([0.5, 0.5 + first]))
 
     def drop(self, gone: NDArray[np.bool_]) -> None:
         """Give up points (N,)."""

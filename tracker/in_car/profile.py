@@ -53,11 +53,11 @@ class Centres:
 def band_rows(horizon: float, height: int, width: int) -> tuple[int, int]:
     """Return the rows [top, bottom) in which vehicles show, by p(x, y | C) (`tracker.in_car.occurrence`).
 
-    From the roof of a lorry at mid-range above the horizon down to the ground some five metres ahead; in
+    From the roof of a near van above the horizon down to the ground some five metres ahead; in
     units of the
     picture's width, since the focal length scales with it.
     """
-    top = int(np.clip(horizon - 0.12 * width, 0, height - 16))
+    top = int(np.clip(horizon - 0.09 * width, 0, height - 16))
     bottom = int(np.clip(horizon + 0.30 * width, top + 16, height))
     return top, bottom
 
@@ -93,29 +93,61 @@ def intensity(picture: Picture, top: int, bottom: int) -> Profile:
 
 @njit(cache=True)
 def _cluster(x0, x1, y):  # type: ignore[no-untyped-def]
-    """Union-find over segments that share their middle and lie close in y."""
+    """Union-find over segments that share their middle and lie close in y.
+
+    Returns:
+        (M,) group of each segment, in the order of the groups' first segments, and (G, 5): length, mean
+        middle and row weighted by length, mean length likewise, segments.
+    """
     total = x0.size
     parent = np.arange(total)
-    for i in range(total):
-        for j in range(i):
-            length_i, length_j = x1[i] - x0[i], x1[j] - x0[j]
+    order = np.argsort(y, kind="mergesort")
+    for at in range(total):
+        i = order[at]
+        length_i = x1[i] - x0[i]
+        # The lengths of two that belong together differ by 2.5 at most.
+        farthest = 0.45 * 2.5 * length_i + 2.0
+        for before in range(at - 1, -1, -1):
+            j = order[before]
+            if y[i] - y[j] > farthest:
+                break
+            length_j = x1[j] - x0[j]
             longer, shorter = max(length_i, length_j), min(length_i, length_j)
-            if shorter < 0.4 * longer or abs(y[i] - y[j]) > 0.45 * longer + 2.0:
+            if shorter < 0.4 * longer or y[i] - y[j] > 0.45 * longer + 2.0:
                 continue
             if abs(x0[i] + x1[i] - x0[j] - x1[j]) > 0.4 * longer:
                 continue
             a, b = i, j
             while parent[a] != a:
+                parent[a] = parent[parent[a]]
                 a = parent[a]
             while parent[b] != b:
+                parent[b] = parent[parent[b]]
                 b = parent[b]
             parent[max(a, b)] = min(a, b)
+    group = np.empty(total, np.int64)
+    sums = np.zeros((total, 5))
+    count = 0
     for i in range(total):
         root = i
         while parent[root] != root:
             root = parent[root]
-        parent[i] = root
-    return parent
+        # The root is the first of its group, so it has its number already.
+        if root == i:
+            group[i] = count
+            count += 1
+        else:
+            group[i] = group[root]
+        length = x1[i] - x0[i]
+        one = sums[group[i]]
+        one[0] += length
+        one[1] += length * 0.5 * (x0[i] + x1[i])
+        one[2] += length * y[i]
+        one[3] += length * length
+        one[4] += 1.0
+    for k in range(count):
+        sums[k, 1:4] /= max(sums[k, 0], 1e-9)
+    return group, sums[:count]
 
 
 @njit(cache=True)
@@ -172,21 +204,12 @@ def find_centres(
     length = found[:, seg.X1] - found[:, seg.X0]
     found = found[length <= np.maximum(longest * np.abs(found[:, seg.Y] - horizon), 40.0)]
     x0, x1, y = found[:, seg.X0].copy(), found[:, seg.X1].copy(), found[:, seg.Y].copy()
-    length = x1 - x0
-    roots = _cluster(x0, x1, y)
-    _, group = np.unique(roots, return_inverse=True)
-    count = int(group.max()) + 1 if len(group) else 0
-    weight = np.bincount(group, length, count)
-    divisor = np.maximum(weight, 1e-9)
-    middle = np.bincount(group, length * 0.5 * (x0 + x1), count) / divisor
-    row = np.bincount(group, length * y, count) / divisor
-    wide = np.bincount(group, length * length, count) / divisor
+    group, sums = _cluster(x0, x1, y)
+    weight, middle, row, wide, size = sums.T
     peaks: NDArray[np.int64] = local_maxima(
         segment_profile, share * float(segment_profile.mean()), round(SMOOTHING)
     )
-    strong = _strongest(middle, np.asarray(weight, np.float64), peaks, reach, layers) | (
-        np.bincount(group, minlength=count) >= stack
-    )
+    strong = _strongest(middle, weight, peaks, reach, layers) | (size >= stack)
     renumber = np.cumsum(strong) - 1
     member = strong[group]
     lamps = features.lamps

@@ -123,7 +123,7 @@ def find_segments(
     *,
     slope: float = 0.2,
     shortest: int = 8,
-    limit: int = 20000,
+    limit: int = 6000,
 ) -> Floats:
     """Find near-horizontal segments.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tracker.filtering import kalman
@@ -64,6 +65,28 @@ def slope_error(noise: float, rate: float, count: NDArray[np.int64]) -> Floats:
     """
     number = np.maximum(count, 2).astype(float)
     return np.asarray(np.sqrt(12.0 / (number * (number * number - 1.0))) * noise * rate)
+
+
+@njit(cache=True)
+def _costs(mean, covariance, width, kind, x, y, wide, kinds):  # type: ignore[no-untyped-def]
+    """Squared distances (N, M) of N traces and M centres in x, y and log width, infinite beyond the gate."""
+    costs = np.full((width.size, x.size), np.inf)
+    for i in range(width.size):
+        spread_x = min(covariance[i, 0, 0, 0], 9.0) + NOISE_X**2
+        spread_row = min(covariance[i, 1, 0, 0], 9.0) + NOISE_Y**2
+        for j in range(x.size):
+            apart = (mean[i, 0, 0] - x[j]) ** 2 / spread_x
+            if apart > GATE or kind[i] != kinds[j]:
+                continue
+            # Which segments of an object are found changes from frame to frame: its row is less sure
+            # than its middle.
+            spread_y = spread_row + (0.08 * max(width[i], wide[j])) ** 2
+            apart += (mean[i, 1, 0] - y[j]) ** 2 / spread_y
+            if apart > GATE:
+                continue
+            ratio = np.log(max(wide[j], 1.0) / max(width[i], 1.0))
+            costs[i, j] = apart + (ratio / 0.35) ** 2
+    return costs
 
 
 class TraceStore:
@@ -137,16 +160,17 @@ class TraceStore:
         self._history[:, -1] = np.nan
 
     def _costs(self, centres: Centres) -> Floats:
-        size = np.maximum(self.width[:, None], centres.width[None])
-        apart_x = self.mean[:, 0, :1] - centres.x[None]
-        apart_y = self.mean[:, 1, :1] - centres.y[None]
-        spread_x = np.minimum(self._covariance[:, 0, 0, :1], 9.0) + NOISE_X**2
-        # Which segments of an object are found changes from frame to frame: its row is less sure
-        # than its middle.
-        spread_y = np.minimum(self._covariance[:, 1, 0, :1], 9.0) + NOISE_Y**2 + (0.08 * size) ** 2
-        ratio = np.log(np.maximum(centres.width[None], 1.0) / np.maximum(self.width[:, None], 1.0))
-        cost = apart_x**2 / spread_x + apart_y**2 / spread_y + (ratio / 0.35) ** 2
-        return np.where(self._kind[:, None] == centres.kind[None], cost, np.inf)
+        costs: Floats = _costs(
+            self.mean,
+            self._covariance,
+            self.width,
+            self._kind,
+            centres.x,
+            centres.y,
+            centres.width,
+            centres.kind,
+        )
+        return costs
 
     def _correct(self, rows: Ids, columns: Ids, centres: Centres) -> None:
         self.source = np.full(len(self.ids), -1, np.int64)

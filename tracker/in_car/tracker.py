@@ -143,7 +143,7 @@ class InCarTracker:
             elif owner:
                 gain = 0.5 * near[index]
             else:
-                gain = near[index] - 1.0
+                gain = near[index] - 1.5
             odds = float(np.clip(odds + gain / (self._info.rate * CORRELATION), -5.0, 5.0))
             odds_now[trace] = odds
             if traces.age[index] >= 0.3:

@@ -11,14 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.in_car.evidence import CLOSING, CLOSING_SHARE
-from tracker.in_car.extent import fit_extent
+from tracker.in_car.extent import REAR, SLIMMEST, WIDEST, Relief, clear, make_relief, refine, roof_row
 from tracker.in_car.points import PointStore
 from tracker.in_car.proposals import (
     BODY_PLAY,
     BODY_SHARE,
-    SLIMMEST,
-    USUAL,
-    WIDEST,
     misfit,
     propose,
     windows_from_edges,
@@ -32,13 +29,17 @@ Floats = NDArray[np.float64]
 # Log odds at which a vehicle is confirmed, and below which it is given up.
 CONFIRM, REJECT = 2.5, -1.5
 # Bounds of the log odds: old evidence must not outlast new evidence for too long.
-LOWEST, HIGHEST = -6.0, 8.0
+LOWEST, HIGHEST = -6.0, 5.0
 # How much more a window must be worth than a vehicle's box to replace it.
-BETTER = 1.5
+BETTER = 1.3
 # Least worth of a window that is begun (`tracker.in_car.proposals`).
-LEAST = 2.0
+LEAST = 0.3
 # The nearest vehicle that is begun is this many times nearer than the farthest.
 NEAREST_SHARE = 12.0
+# Clearness of the outline below which a vehicle is not confirmed, and below which it is given up.
+SHOWN, LOST = 0.45, 0.3
+# The picture is searched for new outlines once in so many frames.
+SEARCH = 3
 # Seconds over which the points' evidence is worth once itself: the span of the displacements.
 CORRELATION = 0.35
 
@@ -57,7 +58,7 @@ class Vehicle:
     members: int = 0
     confirmed: bool = False
     clear: float = 0.0
-    log_width: float = float(np.log(USUAL))
+    log_width: float = float(np.log(REAR))
     rate_of_scale: float = 0.0
     better: int = 0
     rate_error: float = 10.0
@@ -77,6 +78,7 @@ class VehicleStore:
         """Start without vehicles."""
         self._rate = rate
         self._next_id = 1
+        self._frame = 0
         self.vehicles: list[Vehicle] = []
 
     def step(
@@ -101,13 +103,16 @@ class VehicleStore:
             farthest: Least height of the horizon above a contact row, px: beyond that no vehicle is begun.
         """
         horizon = float(ego.focus[1])
+        relief = make_relief(grey, horizon=horizon, middle=float(ego.focus[0]), focal=ego.focal)
         for vehicle in self.vehicles:
             self._carry(vehicle, points, moved)
             self._weigh(vehicle, points, ratios, trust, ego)
-            self._hold(vehicle, grey, points, horizon)
+            self._hold(vehicle, relief, points)
         self._end(grey, points, horizon)
-        self._join(points, moved, ego.speed)
-        self._begin(grey, points, moved, horizon, farthest)
+        self._join(points, ego.speed)
+        self._frame += 1
+        if self._frame % SEARCH == 0:
+            self._begin(relief, points, moved, farthest)
 
     def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats) -> None:
         """Move the box with its points."""
@@ -191,10 +196,17 @@ class VehicleStore:
             * self._divergence(vehicle, float(vehicle.box[3] - ego.focus[1]), ego)
             / (self._rate * CORRELATION)
         )
-        gain -= self._ill_filled(vehicle, points) / (self._rate * CORRELATION)
-        gain -= self._alike(vehicle, points) / (self._rate * CORRELATION)
+        # Within a clear outline it matters little where the points lie and what moves alike around it.
+        doubt = self._ill_filled(vehicle, points) + self._alike(vehicle, points)
+        gain -= doubt / (self._rate * CORRELATION)
+        gain += float(np.clip(2.0 * (vehicle.clear - 0.4), -1.0, 0.0)) / (self._rate * CORRELATION)
         vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
-        if vehicle.odds > CONFIRM and vehicle.age >= 0.2 * self._rate and vehicle.members >= 2:
+        if (
+            vehicle.odds > CONFIRM
+            and vehicle.clear > SHOWN
+            and vehicle.age >= 0.2 * self._rate
+            and vehicle.members >= 2
+        ):
             vehicle.confirmed = True
 
     def _ill_filled(self, vehicle: Vehicle, points: PointStore) -> float:
@@ -226,31 +238,30 @@ class VehicleStore:
         unlike = int((ring & (points.evidence < -0.5)).sum())
         return 2.0 * max(like - unlike - 1, 0) / (like + unlike + vehicle.members + 1.0)
 
-    def _hold(self, vehicle: Vehicle, grey: NDArray[np.uint8], points: PointStore, horizon: float) -> None:
+    def _hold(self, vehicle: Vehicle, relief: Relief, points: PointStore) -> None:
         """Pull the box to the edges of the picture."""
-        own = points.owner == vehicle.id
         box = vehicle.box
-        body = _body(points.position[own], box)
+        contact = box[3] - relief.horizon
+        if contact < 3.0:
+            return
+        body = _body(points.position[points.owner == vehicle.id], box)
         young = vehicle.age < 0.5 * self._rate
-        found = fit_extent(grey, box, loose=0.15 if young else 0.08, body=body)
-        wide, contact = found.box[2] - found.box[0], found.box[3] - horizon
-        clear = min(found.sides, 1.5) + 0.5 * min(max(found.foot, 0.0), 1.5)
-        vehicle.clear += 0.1 * (clear - vehicle.clear)
+        found = refine(relief, box, loose=0.08 if young else 0.05, body=body, log_width=vehicle.log_width)
+        wide, contact = found[2] - found[0], found[3] - relief.horizon
+        shown = clear(relief, found)
+        vehicle.clear += 0.1 * (shown - vehicle.clear)
         if contact <= 2.0 or not SLIMMEST * contact < wide < WIDEST * contact:
             return
         # A vehicle keeps its width in metres, which its width over the height of the horizon is.
-        ratio = np.log(wide / contact)
-        if not young and abs(ratio - vehicle.log_width) > 0.2:
-            return
-        vehicle.log_width += (0.2 if young else 0.02) * (ratio - vehicle.log_width)
-        gain = (0.3 if young else 0.12) * min(clear / 1.2, 1.0)
-        vehicle.box = box + gain * (found.box - box)
+        vehicle.log_width += (0.2 if young else 0.04) * (np.log(wide / contact) - vehicle.log_width)
+        gain = (0.3 if young else 0.15) * min(shown, 1.0)
+        vehicle.box = box + gain * (found - box)
 
     def _end(self, grey: NDArray[np.uint8], points: PointStore, horizon: float) -> None:
         height, width = grey.shape
         patience = 0.5 * self._rate
         kept: list[Vehicle] = []
-        for vehicle in sorted(self.vehicles, key=lambda one: (not one.confirmed, -one.odds)):
+        for vehicle in sorted(self.vehicles, key=lambda one: (not one.confirmed, -one.clear)):
             box = vehicle.box
             wide, tall = box[2] - box[0], box[3] - box[1]
             seen = max(min(box[2], width) - max(box[0], 0.0), 0.0) * max(
@@ -258,6 +269,7 @@ class VehicleStore:
             )
             gone = (
                 vehicle.odds < REJECT
+                or (vehicle.clear < LOST and vehicle.age > 0.3 * self._rate)
                 or vehicle.missed > (patience if vehicle.confirmed else 3)
                 or seen < 0.25 * wide * tall
                 or tall < 6.0
@@ -271,93 +283,71 @@ class VehicleStore:
                 kept.append(vehicle)
         self.vehicles = sorted(kept, key=lambda one: one.id)
 
-    def _join(self, points: PointStore, moved: Floats, moving: float) -> None:
+    def _join(self, points: PointStore, moving: float) -> None:
         """Give new points on a vehicle to it, and take back those that lie outside."""
         x, y = points.position.T
         for vehicle in self.vehicles:
             box = vehicle.box
             wide, tall = box[2] - box[0], box[3] - box[1]
             own = points.owner == vehicle.id
-            far = (x < box[0] - 0.3 * wide) | (x > box[2] + 0.3 * wide)
-            far |= (y < box[1] - 0.35 * wide) | (y > box[3] + 0.2 * wide)
+            far = (x < box[0] - 0.06 * wide - 2.0) | (x > box[2] + 0.06 * wide + 2.0)
+            far |= (y < box[1] - 0.35 * wide) | (y > box[3] + 0.08 * wide + 2.0)
             points.owner[own & far] = 0
             inside = (x > box[0] + 0.03 * wide) & (x < box[2] - 0.03 * wide)
             inside &= (y > box[1] + 0.03 * tall) & (y < box[3] + 0.02 * tall)
-            fringe = (x > box[0] - 0.25 * wide) & (x < box[2] + 0.25 * wide)
-            fringe &= (y > box[1] - 0.3 * wide) & (y < box[3] + 0.15 * wide) & (points.evidence > 2.0)
             middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])])
             expected = vehicle.velocity + vehicle.growth * (points.position - middle)
             along = np.abs(points.flow - expected).max(1) < 0.7 + 0.01 * wide
-            if vehicle.members >= 3:
-                # What is just outside may be a part of it, if over a longer time it moves along.
-                usual = np.median(moved[own], axis=0) if own.any() else np.zeros(2)
-                inside |= fringe & (np.abs(moved - usual).max(1) < 0.8 * BODY_PLAY + BODY_SHARE * wide)
             fresh = inside & along & (points.owner == 0) & (points.age >= 3)
             fresh &= (points.evidence > 0.3) | (moving < 2.0)
             points.owner[fresh] = vehicle.id
 
-    def _begin(
-        self,
-        grey: NDArray[np.uint8],
-        points: PointStore,
-        moved: Floats,
-        horizon: float,
-        farthest: float,
-    ) -> None:
+    def _begin(self, relief: Relief, points: PointStore, moved: Floats, farthest: float) -> None:
+        """Begin vehicles where unowned points move like one within a clear outline; replace bad outlines."""
         ripe = points.age >= 4
-        likely = ripe & (points.evidence > 1.0) & (points.position[:, 1] > horizon + 2.0)
+        likely = ripe & (points.evidence > 1.0) & (points.position[:, 1] > relief.horizon + 2.0)
         if likely.sum() < 2:
             return
         position = points.position
-        windows, clear = windows_from_edges(
-            grey, position[likely], horizon, NEAREST_SHARE * farthest, farthest
-        )
+        windows, shown = windows_from_edges(relief, position[likely], NEAREST_SHARE * farthest, farthest)
         known = ripe & (np.abs(points.evidence) > 0.8)
-        seen = position[known], moved[known], points.evidence[known], horizon
-        for window, value in zip(*propose(windows, clear, *seen, least=LEAST, most=12), strict=True):
+        seen = position[known], moved[known], points.evidence[known]
+        for window, value in zip(
+            *propose(windows, shown, *seen, relief.horizon, least=LEAST, most=12), strict=True
+        ):
+            inside = _inside(position, window, 0.05) & (points.evidence > 0.5)
+            window[1] = roof_row(relief, window[0], window[2], window[3], _body(position[inside], window)[1])
             shared = [_covered(window, one.box) for one in self.vehicles]
             if not shared or max(shared) < 0.3:
-                self._try(window, grey, points, ripe & (points.owner == 0), horizon, farthest)
+                self._try(window, clear(relief, window), points, ripe & (points.owner == 0), relief.horizon)
                 continue
             # A better outline of a vehicle that is tracked already.
             rival = self.vehicles[int(np.argmax(shared))]
-            if value > BETTER * max(worth(rival.box, grey, *seen), 0.0):
+            if value > BETTER * max(worth(rival.box, relief, *seen), 0.0):
                 rival.better += 1
-                if rival.better >= 3:
+                if rival.better >= 2:
                     rival.box, rival.better = window.copy(), 0
-                    rival.log_width = float(np.log((window[2] - window[0]) / (window[3] - horizon)))
+                    rival.log_width = float(np.log((window[2] - window[0]) / (window[3] - relief.horizon)))
             else:
                 rival.better = 0
 
     def _try(
-        self,
-        window: Floats,
-        grey: NDArray[np.uint8],
-        points: PointStore,
-        free: NDArray[np.bool_],
-        horizon: float,
-        farthest: float,
+        self, box: Floats, shown: float, points: PointStore, free: NDArray[np.bool_], horizon: float
     ) -> None:
-        inside = _inside(points.position, window, 0.05) & free & (points.evidence > 0.5)
-        body = _body(points.position[inside], window)
-        found = fit_extent(grey, window, loose=0.12, body=body)
-        box = found.box
-        wide, contact = box[2] - box[0], box[3] - horizon
-        if contact < farthest or not SLIMMEST * contact < wide < WIDEST * contact:
-            return
-        if found.sides < 0.5:
-            return
         if any(_covered(box, other.box) > 0.35 for other in self.vehicles):
             return
         members = _inside(points.position, box, 0.05) & free
         good = members & (points.evidence > 0.5)
         if good.sum() < 2 or (members & (points.evidence < -0.8)).sum() > 0.5 * good.sum():
             return
-        vehicle = Vehicle(id=self._next_id, box=box, log_width=float(np.log(wide / contact)))
+        vehicle = Vehicle(
+            id=self._next_id,
+            box=box,
+            clear=shown,
+            log_width=float(np.log((box[2] - box[0]) / (box[3] - horizon))),
+        )
         self._next_id += 1
-        flow = points.flow[good]
-        vehicle.velocity = np.median(flow, axis=0)
-        vehicle.odds = 0.0
+        vehicle.velocity = np.median(points.flow[good], axis=0)
         vehicle.members = int(good.sum())
         points.owner[good] = vehicle.id
         self.vehicles.append(vehicle)

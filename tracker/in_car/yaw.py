@@ -22,6 +22,12 @@ Floats = NDArray[np.float64]
 FLOW_NOISE = 0.25
 # Camera height assumed where the scale of the ground is not yet known, metres (typical of a dash camera).
 HEIGHT = 1.25
+# The ground's expansion is sought on a scale of logarithms: its step, and the speeds that it spans, m/s.
+LOG_STEP, SLOWEST, FASTEST = 0.04, 0.7, 90.0
+# Usual speed, m/s, and the log spread of speed without an odometer, of the camera's height with one.
+USUAL_SPEED, SPEED_SPREAD, HEIGHT_SPREAD = 20.0, 1.0, 0.4
+# Seconds for which the histogram of the ground's expansion remembers, without and with an odometer.
+MEMORY, LONG_MEMORY = 0.7, 4.0
 
 
 @njit(cache=True)
@@ -61,28 +67,14 @@ def _rotation(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _mode(ratio, spread, weight, prior, prior_spread):  # type: ignore[no-untyped-def]
-    """Return where weighted kernels of their own spread pile up highest under a Gaussian prior.
-
-    And the support there.
-    """
-    best, place, support = -1.0, prior, 0.0
-    for i in range(ratio.size + 1):
-        candidate = prior if i == ratio.size else ratio[i]
-        total = 0.0
-        for j in range(ratio.size):
-            total += weight[j] * np.exp(-0.5 * ((ratio[j] - candidate) / spread[j]) ** 2)
-        value = (total + 0.5) * np.exp(-0.5 * ((candidate - prior) / prior_spread) ** 2)
-        if value > best:
-            best, place, support = value, candidate, total
-    numerator, divisor = 0.0, 1e-9
-    for j in range(ratio.size):
-        near = weight[j] * np.exp(-0.5 * ((ratio[j] - place) / spread[j]) ** 2) / (spread[j] * spread[j])
-        numerator += near * ratio[j]
-        divisor += near
-    if support > 0.5:
-        place = numerator / divisor
-    return place, support
+def _deposit(pile, places, spreads, weights):  # type: ignore[no-untyped-def]
+    """Add a Gaussian of weight ``weights`` at each of ``places`` (in bins) to a histogram, in place."""
+    for j in range(places.size):
+        reach = 3.0 * spreads[j]
+        first, last = max(0, int(places[j] - reach)), min(pile.size - 1, int(places[j] + reach) + 1)
+        scale = weights[j] / spreads[j]
+        for i in range(first, last + 1):
+            pile[i] += scale * np.exp(-0.5 * ((i - places[j]) / spreads[j]) ** 2)
 
 
 class EgoMotion:
@@ -113,12 +105,13 @@ class EgoMotion:
         self._vector = self._information @ self.focus
         self._prior_information, self._prior_vector = self._information.copy(), self._vector.copy()
         self.ground = 15.0 / (focal * HEIGHT)
-        self._ground_spread = 0.8
+        self._pile = np.zeros(round(np.log(FASTEST / SLOWEST) / LOG_STEP) + 1)
+        self._metered = False
+        self._moving = 1.0
         self.yaw_rate = 0.0
         self.shift = np.zeros(2)
         self._drift = 0.0
         self._per_speed = 1.0 / (focal * HEIGHT)
-        self._calibrated = 0.0
 
     @property
     def speed(self) -> float:
@@ -221,32 +214,54 @@ class EgoMotion:
     def _learn_ground(
         self, position: Floats, moved: Floats, seconds: Floats, weight: Floats, speed: float | None
     ) -> None:
+        if speed is not None and not self._metered:
+            self._metered, self._pile = True, np.zeros_like(self._pile)
         # Rate and row both of the middle of the time.
         below = position - 0.5 * moved - self.focus
         rate, error = self.expansion(position, moved, seconds)
         # The corridor of the road: three metres to each side.
         use = (weight > 0) & (below[:, 1] > 14.0) & (np.abs(below[:, 0]) < 3.0 * below[:, 1])
-        ratio = rate[use] / below[use, 1]
-        spread = np.hypot(error[use] / below[use, 1], 0.08 * self.ground + 2e-4)
+        per_metre = self.focal * HEIGHT / below[use, 1]
+        speeds, errors = rate[use] * per_metre, error[use] * per_metre
         value = weight[use] * np.minimum(below[use, 1] / 60.0, 1.5)
-        prior, loose = self.ground, self._ground_spread * self.ground + 2e-3
-        if speed is not None and self._calibrated > 0.3:
-            prior, loose = speed * self._per_speed, 0.15 * speed * self._per_speed + 3e-4
         # What stands still in the picture may be a vehicle, the bonnet, dirt on the glass or an
-        # edge that hides its own
-        # motion; what expands like the ground can only be the ground. So few expanding points
-        # outvote many still ones.
-        expanding = ratio > np.maximum(3.0 * error[use] / below[use, 1], 0.3 * self.ground)
-        if value[expanding].sum() > 0.15 * value[~expanding].sum():
-            ratio, spread, value = ratio[expanding], spread[expanding], value[expanding]
-        place, support = _mode(ratio, spread, value, prior, loose)
-        gain = min(1.0, 8.0 / self._rate) * support / (support + 2.0)
-        self.ground = max(0.0, self.ground + gain * (place - self.ground))
-        self._ground_spread += gain * (0.15 - self._ground_spread)
-        if speed is not None:
-            if speed > 3.0:
-                learn = 0.03 * support / (support + 2.0)
-                self._per_speed += learn * (self.ground / speed - self._per_speed)
-                self._calibrated = min(1.0, self._calibrated + learn)
-            if self._calibrated > 0.3:
-                self.ground += 0.2 * (speed * self._per_speed - self.ground)
+        # edge that hides its own motion; what expands like the ground can only be the ground. So few
+        # expanding points outvote many still ones, and they are gathered over a while.
+        expanding = speeds > np.maximum(3.0 * errors, 1.0)
+        if speed is None:
+            self._gather(speeds[expanding], errors[expanding], value[expanding], MEMORY)
+            total = float(value.sum())
+            gain = min(1.0, 3.0 / self._rate) * total / (total + 2.0)
+            self._moving += gain * (float(value[expanding].sum()) / max(total, 1e-9) - self._moving)
+            going, support = self._peak(USUAL_SPEED, SPEED_SPREAD)
+            if self._moving < 0.1:
+                going = 0.0
+            gain = min(1.0, 6.0 / self._rate) * support / (support + 2.0)
+            self.ground += gain * (going / (self.focal * HEIGHT) - self.ground)
+            return
+        if speed > 3.0:
+            # Metres a second for each one of the odometer's: the height, once for all.
+            ratio, loose = speeds[expanding] / speed, errors[expanding] / speed
+            self._gather(USUAL_SPEED * ratio, USUAL_SPEED * loose, value[expanding], LONG_MEMORY)
+            place, support = self._peak(USUAL_SPEED, HEIGHT_SPREAD)
+            factor = place / USUAL_SPEED / (self.focal * HEIGHT)
+            self._per_speed += 0.1 * support / (support + 20.0) * (factor - self._per_speed)
+        self.ground = max(0.0, speed * self._per_speed)
+
+    def _gather(self, speeds: Floats, errors: Floats, weights: Floats, memory: float) -> None:
+        """Add measured speeds, m/s, to the histogram of their logarithms."""
+        self._pile *= np.exp(-1.0 / (self._rate * memory))
+        places = np.log(np.maximum(speeds, 1e-3) / SLOWEST) / LOG_STEP
+        spreads = np.hypot(errors / np.maximum(speeds, 1e-3), 0.06) / LOG_STEP
+        _deposit(self._pile, places, spreads, weights)
+
+    def _peak(self, usual: float, spread: float) -> tuple[float, float]:
+        """Return the speed at which the histogram is highest under a prior, and the support there."""
+        logs = np.log(SLOWEST) + LOG_STEP * np.arange(len(self._pile))
+        prior = np.exp(-0.5 * ((logs - np.log(usual)) / spread) ** 2)
+        value = self._pile * prior
+        best = int(value.argmax())
+        near = slice(max(0, best - 2), best + 3)
+        if value[best] <= 0.0:
+            return usual, 0.0
+        return float(np.exp((value[near] * logs[near]).sum() / value[near].sum())), float(self._pile[best])

@@ -181,7 +181,15 @@ def test_clusters_are_connected_components(seed, count):
             for j in range(count):
                 if alike(i, j):
                     labels[i] = labels[j] = min(labels[i], labels[j])
-    assert np.array_equal(prof._cluster(x0, x1, y), labels)
+    group, sums = prof._cluster(x0, x1, y)
+    roots, expected = np.unique(labels, return_inverse=True)
+    assert np.array_equal(group, expected)
+    assert sums.shape == (len(roots), 5)
+    length = x1 - x0
+    for k in range(len(roots)):
+        own = expected == k
+        means = [np.average(of[own], weights=length[own]) for of in (0.5 * (x0 + x1), y, length)]
+        assert np.allclose(sums[k], [length[own].sum(), *means, own.sum()])
 
 
 @given(st.lists(st.integers(0, 6), min_size=1, max_size=60), st.integers(1, 5))
