@@ -15,8 +15,6 @@ from sim.rng import stream
 Floats32 = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
-_TILE = 1024
-
 _DAY_LEVEL, _NIGHT_LEVEL = 112.0, 9.0
 _DAY_GAIN, _NIGHT_GAIN = (0.72, 1.35), (0.8, 1.25)
 _WIPER_SECONDS = 1.6

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.camera import Camera, Pose
 from sim.models import Ground, Light, Model
-from sim.world import Bodies, WorldState
+from sim.world import Bodies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,10 +62,3 @@ class Silhouettes:
     pixels_full: NDArray[np.int64]
     boxes: NDArray[np.float64]
     masks: tuple[tuple[int, int, NDArray[np.bool_]], ...] | None = None
-
-
-class Renderer(Protocol):
-    """Draws the world of one stage."""
-
-    def render(self, state: WorldState, camera: Camera, pose: Pose) -> Picture:
-        """Draw one frame."""

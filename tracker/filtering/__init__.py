@@ -1,1 +1,1 @@
-"""What the trackers share: Kalman filter, gating, assignment."""
+"""What the trackers share: Kalman filter and gated assignment."""

@@ -1,4 +1,4 @@
-"""Gating and assignment."""
+"""Assignment within a gate."""
 
 from __future__ import annotations
 
@@ -8,13 +8,6 @@ from scipy.optimize import linear_sum_assignment
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-
-def mahalanobis(difference: ArrayLike, covariance: ArrayLike) -> Floats:
-    """Return squared Mahalanobis distances (...) of differences (..., m) under covariances (..., m, m)."""
-    difference = np.asarray(difference, float)
-    solved = np.linalg.solve(np.asarray(covariance, float), difference[..., None])[..., 0]
-    return np.asarray((difference * solved).sum(-1))
 
 
 def assign(cost: ArrayLike, gate: float) -> tuple[Indices, Indices]:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracker.filtering import kalman
-from tracker.filtering.assignment import assign, mahalanobis
+from tracker.filtering.assignment import assign
 
 
 def test_prediction_of_constant_velocity():
@@ -37,10 +37,6 @@ def test_update_is_the_textbook_one(seed):
         gain = covariance[i] @ observation.T @ np.linalg.inv(spread)
         assert np.allclose(new_mean[i], mean[i] + gain @ (measured[i] - observation @ mean[i]))
         assert np.allclose(new_covariance[i], (np.eye(3) - gain @ observation) @ covariance[i])
-
-
-def test_mahalanobis():
-    assert np.allclose(mahalanobis([[3.0, 4.0]], [np.diag([9.0, 4.0])]), [1.0 + 4.0])
 
 
 def _best(cost, gate):
