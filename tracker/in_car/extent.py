@@ -31,7 +31,7 @@ FRAME_SIDE = 1.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Relief:
-    """Integral images (h + 1, w + 1) of a picture's edges, and what is known of the scene.
+    """Integral images (h + 1, w + 1) of a picture's edges, in half grey levels, and what is known of the scene.
 
     Attributes:
         across: Of the absolute steps from one column to the next.
@@ -42,9 +42,9 @@ class Relief:
         focal: Px.
     """
 
-    across: Floats
-    signed: Floats
-    down: Floats
+    across: NDArray[np.int32]
+    signed: NDArray[np.int32]
+    down: NDArray[np.int32]
     horizon: float
     middle: float
     focal: float
@@ -52,45 +52,56 @@ class Relief:
 
 @njit(cache=True)
 def _integrals(grey):  # type: ignore[no-untyped-def]
+    """Sum up the edges in both directions (h + 1, w + 1, 3), the three sums of a place side by side."""
     height, width = grey.shape
-    across = np.zeros((height + 1, width + 1))
-    signed = np.zeros((height + 1, width + 1))
-    down = np.zeros((height + 1, width + 1))
+    sums = np.empty((height + 1, width + 1, 3), np.int32)
+    sums[0] = 0
+    # Of each column down to the present row.
+    across, signed, down = np.zeros(width, np.int32), np.zeros(width, np.int32), np.zeros(width, np.int32)
+    inner = across[2 : width - 1]
     for i in range(height):
-        a, s, d = 0.0, 0.0, 0.0
+        here = grey[i]
+        before, left, place, right = here[: width - 3], here[1 : width - 2], here[2 : width - 1], here[3:]
+        for j in range(width - 3):
+            inner[j] += abs(np.int32(place[j]) + np.int32(right[j]) - np.int32(left[j]) - np.int32(before[j]))
+        if 2 <= i < height - 1:
+            top, above, below = grey[i - 2], grey[i - 1], grey[i + 1]
+            for j in range(width):
+                step = np.int32(here[j]) + np.int32(below[j]) - np.int32(above[j]) - np.int32(top[j])
+                signed[j] += step
+                down[j] += abs(step)
+        row = sums[i + 1]
+        row[0] = 0
+        a, s, d = np.int32(0), np.int32(0), np.int32(0)
         for j in range(width):
-            if 2 <= j < width - 1:
-                a += 0.5 * abs(
-                    float(grey[i, j]) + float(grey[i, j + 1]) - float(grey[i, j - 1]) - float(grey[i, j - 2])
-                )
-            if 2 <= i < height - 1:
-                step = 0.5 * (
-                    float(grey[i, j]) + float(grey[i + 1, j]) - float(grey[i - 1, j]) - float(grey[i - 2, j])
-                )
-                s += step
-                d += abs(step)
-            across[i + 1, j + 1] = across[i, j + 1] + a
-            signed[i + 1, j + 1] = signed[i, j + 1] + s
-            down[i + 1, j + 1] = down[i, j + 1] + d
-    return across, signed, down
+            a += across[j]
+            s += signed[j]
+            d += down[j]
+            row[j + 1, 0] = a
+            row[j + 1, 1] = s
+            row[j + 1, 2] = d
+    return sums
 
 
 def make_relief(grey: NDArray[np.uint8], *, horizon: float, middle: float, focal: float) -> Relief:
-    """Sum up the edges of a picture (h, w)."""
-    across, signed, down = _integrals(grey)
+    """Sum up the edges of a picture (h, w), which is at least four pixels wide."""
+    across, signed, down = np.moveaxis(_integrals(grey), 2, 0)
     return Relief(across=across, signed=signed, down=down, horizon=horizon, middle=middle, focal=focal)
 
 
 @njit(cache=True)
 def _mean(sums, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
-    """Return the mean over columns [x0, x1) and rows [y0, y1), cut to the picture; 0 where that is empty."""
+    """Return the mean over columns [x0, x1) and rows [y0, y1), cut to the picture; 0 where that is empty.
+
+    In grey levels: the sums count the halves of them.
+    """
     height, width = sums.shape[0] - 1, sums.shape[1] - 1
     x0, x1 = min(max(x0, 0), width), min(max(x1, 0), width)
     y0, y1 = min(max(y0, 0), height), min(max(y1, 0), height)
     if x1 <= x0 or y1 <= y0:
         return 0.0
     total = sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0]
-    return total / ((x1 - x0) * (y1 - y0))
+    return 0.5 * total / ((x1 - x0) * (y1 - y0))
 
 
 @njit(cache=True)
