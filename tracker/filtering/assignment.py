@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
@@ -21,21 +22,37 @@ def assign(cost: ArrayLike, gate: float) -> tuple[Indices, Indices]:
         Rows and columns of the pairs, rows ascending.
     """
     cost = np.asarray(cost, float)
-    possible = np.isfinite(cost) & (cost <= gate)
-    if not possible.any():
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
     # Pairs that compete with none are settled; the rest is small.
-    alone = possible & (possible.sum(1) == 1)[:, None] & (possible.sum(0) == 1)
-    contested = possible & ~alone
-    rows, columns = np.nonzero(alone)
-    if contested.any():
-        some_rows, some_columns = np.flatnonzero(contested.any(1)), np.flatnonzero(contested.any(0))
-        part = np.ix_(some_rows, some_columns)
-        found_rows, found_columns = _cheapest(cost[part], contested[part])
-        rows = np.concatenate([rows, some_rows[found_rows]])
-        columns = np.concatenate([columns, some_columns[found_columns]])
-    order = np.argsort(rows)
-    return rows[order].astype(np.int64), columns[order].astype(np.int64)
+    row_rivals, column_rivals, partners = _rivals(cost, gate)
+    if not row_rivals.any():
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    alone = (row_rivals == 1) & (column_rivals[partners] == 1)
+    contested = (row_rivals > 0) & ~alone
+    if not contested.any():
+        rows = np.flatnonzero(alone)
+        return rows, partners[rows]
+    partners = np.where(alone, partners, -1)
+    column_rivals[partners[alone]] = 0
+    some_rows, some_columns = np.flatnonzero(contested), np.flatnonzero(column_rivals)
+    part = cost[np.ix_(some_rows, some_columns)]
+    found_rows, found_columns = _cheapest(part, part <= gate)
+    partners[some_rows[found_rows]] = some_columns[found_columns]
+    rows = np.flatnonzero(partners >= 0)
+    return rows, partners[rows]
+
+
+@njit(cache=True)
+def _rivals(cost, gate):  # type: ignore[no-untyped-def]
+    """Count the possible partners of each row and column; of each row also the last of them, else 0."""
+    rows, columns = np.zeros(cost.shape[0], np.int64), np.zeros(cost.shape[1], np.int64)
+    partners = np.zeros(cost.shape[0], np.int64)
+    for i in range(cost.shape[0]):
+        for j in range(cost.shape[1]):
+            if cost[i, j] <= gate:
+                rows[i] += 1
+                columns[j] += 1
+                partners[i] = j
+    return rows, columns, partners
 
 
 def _cheapest(cost: Floats, possible: NDArray[np.bool_]) -> tuple[Indices, Indices]:

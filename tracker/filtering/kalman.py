@@ -1,59 +1,54 @@
-"""Kalman filter for constant velocity, many targets at a time.
+"""Kalman filter for constant velocity with measured positions, many targets at a time, one axis each.
 
-Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, chapters 5 and 6.
+Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, chapters 5 and 6;
+written out for two states, since the general form spends its time on the shapes of small matrices.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-Floats = NDArray[np.float64]
+from numba import njit
 
 
-def constant_velocity(step: float, intensity: float, axes: int = 1) -> tuple[Floats, Floats]:
-    """Build the transition and the noise of white acceleration.
+@njit(cache=True)
+def predict(mean, covariance, step, intensity):  # type: ignore[no-untyped-def]
+    """Advance N targets by one step, in place.
 
     Args:
+        mean: (N, 2) position and velocity, units and units/s.
+        covariance: (N, 2, 2).
         step: Seconds between two measurements.
-        intensity: Power spectral density of the acceleration, units^2 / s^3.
-        axes: Number of axes; the state is (position, velocity) for each in turn.
-
-    Returns:
-        F and Q, each (2 axes, 2 axes).
+        intensity: Power spectral density of the white acceleration, units^2 / s^3.
     """
-    transition = np.array([[1.0, step], [0.0, 1.0]])
-    noise = intensity * np.array([[step**3 / 3, step**2 / 2], [step**2 / 2, step]])
-    eye = np.eye(axes)
-    return np.asarray(np.kron(eye, transition), np.float64), np.asarray(np.kron(eye, noise), np.float64)
+    for i in range(mean.shape[0]):
+        own = covariance[i]
+        mean[i, 0] += step * mean[i, 1]
+        own[0, 0] += step * (2.0 * own[0, 1] + step * own[1, 1]) + intensity * step**3 / 3.0
+        own[0, 1] += step * own[1, 1] + intensity * step**2 / 2.0
+        own[1, 0] = own[0, 1]
+        own[1, 1] += intensity * step
 
 
-def predict(mean: Floats, covariance: Floats, transition: Floats, noise: Floats) -> tuple[Floats, Floats]:
-    """Advance N states (N, n) and covariances (N, n, n) by one step."""
-    moved: Floats = mean @ transition.T
-    spread: Floats = transition @ covariance @ transition.T + noise
-    return moved, spread
+@njit(cache=True)
+def update(mean, covariance, rows, positions, noise):  # type: ignore[no-untyped-def]
+    """Correct some of N targets by one measured position each, in place.
 
-
-def update(
-    mean: Floats, covariance: Floats, measurement: ArrayLike, observation: Floats, noise: Floats
-) -> tuple[Floats, Floats]:
-    """Correct N states by one measurement each.
+    The covariance is corrected in Joseph's form, so it stays symmetric and positive.
 
     Args:
-        mean: (N, n).
-        covariance: (N, n, n).
-        measurement: (N, m).
-        observation: (m, n).
-        noise: (m, m) or (N, m, m).
-
-    Returns:
-        Corrected mean and covariance; the covariance in Joseph's form, so it stays symmetric and positive.
+        mean: (N, 2) position and velocity, units and units/s.
+        covariance: (N, 2, 2).
+        rows: (K,) targets that were measured.
+        positions: (K,) where.
+        noise: Variance of a measured position, units^2.
     """
-    innovation = np.asarray(measurement, float) - mean @ observation.T
-    spread = observation @ covariance @ observation.T + noise
-    gain = np.swapaxes(np.linalg.solve(spread, observation @ covariance), -1, -2)
-    corrected = mean + np.einsum("nij,nj->ni", gain, innovation)
-    rest = np.eye(mean.shape[1]) - gain @ observation
-    covariance = rest @ covariance @ np.swapaxes(rest, -1, -2) + gain @ noise @ np.swapaxes(gain, -1, -2)
-    return corrected, covariance
+    for k in range(rows.size):
+        state, own = mean[rows[k]], covariance[rows[k]]
+        spread = own[0, 0] + noise
+        gain, drag = own[0, 0] / spread, own[0, 1] / spread
+        innovation = positions[k] - state[0]
+        state[0] += gain * innovation
+        state[1] += drag * innovation
+        own[1, 1] += drag * (drag * spread - 2.0 * own[0, 1])
+        own[0, 1] = (1.0 - gain) * (own[0, 1] - drag * own[0, 0]) + gain * drag * noise
+        own[1, 0] = own[0, 1]
+        own[0, 0] = (1.0 - gain) ** 2 * own[0, 0] + gain**2 * noise

@@ -92,22 +92,23 @@ class FrontEnd:
         return np.interp(places, np.arange(len(values)), values).astype(np.float32)
 
     def _traces(self, centres: prof.Centres) -> TraceSet:
-        store, scale = self._store, self.picture.scale
-        shown = store.hits >= MIN_HITS
-        slope, error = store.slopes()
+        scale, live = self.picture.scale, self._store.live
+        shown = live["hits"] >= MIN_HITS
+        slope, error = self._store.slopes()
         trace_of = np.zeros(len(centres.x), np.int64)
-        seen = shown & (store.source >= 0)
-        trace_of[store.source[seen]] = store.ids[seen]
+        seen = shown & (live["source"] >= 0)
+        trace_of[live["source"][seen]] = live["id"][seen]
         supports = trace_of[centres.owners]
+        ripe = live[shown]
         return TraceSet(
-            ids=store.ids[shown],
-            x=store.mean[shown, 0, 0] * scale,
-            y=store.mean[shown, 1, 0] * scale,
+            ids=ripe["id"].copy(),
+            x=ripe["mean"][:, 0, 0] * scale,
+            y=ripe["mean"][:, 1, 0] * scale,
             v=slope[shown] * scale,
             sigma_v=error[shown] * scale,
-            width=store.width[shown] * scale,
-            age=store.age[shown] / self._rate,
-            missed=store.missed[shown],
+            width=ripe["width"] * scale,
+            age=ripe["age"] / self._rate,
+            missed=ripe["missed"].copy(),
             points=centres.points[supports > 0] * scale,
             point_traces=supports[supports > 0],
         )

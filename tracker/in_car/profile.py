@@ -102,22 +102,19 @@ def _cluster(x0, x1, y):  # type: ignore[no-untyped-def]
     total = x0.size
     parent = np.arange(total)
     order = np.argsort(y, kind="mergesort")
+    rows, lengths, doubles = y[order], (x1 - x0)[order], (x0 + x1)[order]
     for at in range(total):
-        i = order[at]
-        length_i = x1[i] - x0[i]
+        row, length, double = rows[at], lengths[at], doubles[at]
         # The lengths of two that belong together differ by 2.5 at most.
-        farthest = 0.45 * 2.5 * length_i + 2.0
+        farthest = 0.45 * 2.5 * length + 2.0
         for before in range(at - 1, -1, -1):
-            j = order[before]
-            if y[i] - y[j] > farthest:
+            if row - rows[before] > farthest:
                 break
-            length_j = x1[j] - x0[j]
-            longer, shorter = max(length_i, length_j), min(length_i, length_j)
-            if shorter < 0.4 * longer or y[i] - y[j] > 0.45 * longer + 2.0:
+            longer, shorter = max(length, lengths[before]), min(length, lengths[before])
+            apart = abs(double - doubles[before]) > 0.4 * longer
+            if apart | (shorter < 0.4 * longer) | (row - rows[before] > 0.45 * longer + 2.0):
                 continue
-            if abs(x0[i] + x1[i] - x0[j] - x1[j]) > 0.4 * longer:
-                continue
-            a, b = i, j
+            a, b = order[at], order[before]
             while parent[a] != a:
                 parent[a] = parent[parent[a]]
                 a = parent[a]

@@ -41,79 +41,99 @@ def edge_threshold(
     Returns:
         Threshold on the derivative's magnitude.
     """
-    restless = float(np.median(np.abs(derivative[::5, ::5])))
+    # The median, by counting.
+    counts = np.cumsum(np.bincount(np.abs(derivative[::5, ::5]).ravel()))
+    half = counts[-1] / 2
+    restless = 0.5 * (np.searchsorted(counts, half) + np.searchsorted(counts, half, side="right"))
     return float(np.clip(spread * restless, STEP * floor, STEP * ceiling))
 
 
+# Columns of the table of chains while they grow: two rows and columns, and sums.
+_START, _FIRST, _LAST, _LAST_ROW, _SIGN, _COUNT, _ROWS, _SIZES = range(8)
+
+
 @njit(cache=True)
-def _chain(columns, threshold, slope, shortest, limit):  # type: ignore[no-untyped-def]
+def _continues(chains, label, sign, column, row, slope):  # type: ignore[no-untyped-def]
+    """Tell whether an edge maximum carries on a chain; label -1 is none."""
+    return (
+        label >= 0
+        and chains[label, _SIGN] == sign
+        and chains[label, _LAST] != column
+        and abs(row - chains[label, _FIRST]) <= 1.0 + slope * (column - chains[label, _START])
+    )
+
+
+@njit(cache=True)
+def _chain(columns, least, slope, shortest, limit):  # type: ignore[no-untyped-def]
     """Chain edge maxima; ``columns`` is the derivative transposed, (W, H)."""
     width, height = columns.shape
-    table = np.empty((limit, 6), np.float64)
-    first_row = np.empty(limit, np.int32)
-    count = np.zeros(limit, np.int32)
-    total_rows = np.zeros(limit, np.float64)
-    total_strength = np.zeros(limit, np.float64)
-    last_column = np.zeros(limit, np.int32)
-    last_row = np.zeros(limit, np.int32)
-    start_column = np.zeros(limit, np.int32)
-    sign = np.zeros(limit, np.int8)
-    labels = np.full((3, height), -1, np.int32)
+    # Marks are looked through eight at a time.
+    marks = np.zeros((height + 7) // 8 * 8, np.uint8)
+    eights, inner = marks.view(np.uint64), marks[1 : height - 1]
+    maxima = np.empty(marks.size + 1, np.int64)
+    chains = np.empty((limit, 8), np.int32)
+    # Of the last three columns, with a row to spare above and below.
+    labels = np.full((3, height + 2), -1, np.int32)
     used = 0
     for column in range(width):
+        values = columns[column]
+        above, here, below = values[: height - 2], values[1 : height - 1], values[2:]
+        for i in range(height - 2):
+            brighter = (here[i] >= least) & (here[i] >= above[i]) & (here[i] > below[i])
+            darker = (here[i] <= -least) & (here[i] <= above[i]) & (here[i] < below[i])
+            inner[i] = np.uint8(brighter | darker)
+        number = 0
+        for k in range(eights.size):
+            if eights[k] != 0:
+                # Without a branch, which would be guessed wrongly as often as not.
+                for row in range(8 * k, 8 * k + 8):
+                    maxima[number] = row
+                    number += marks[row]
         now, before, earlier = column % 3, (column + 2) % 3, (column + 1) % 3
-        labels[now, :] = -1
-        for row in range(1, height - 1):
-            value = columns[column, row]
-            size = abs(value)
-            if size < threshold:
-                continue
-            rising = 1 if value > 0 else -1
-            if size < rising * columns[column, row - 1] or size <= rising * columns[column, row + 1]:
-                continue
-            found = -1
-            for back in (before, earlier):
-                for offset in (0, -1, 1):
-                    candidate = row + offset
-                    if candidate < 0 or candidate >= height:
-                        continue
-                    label = labels[back, candidate]
-                    if label < 0 or sign[label] != rising or last_column[label] == column:
-                        continue
-                    reach = 1.0 + slope * (column - start_column[label])
-                    if abs(row - first_row[label]) <= reach:
-                        found = label
+        labels[now] = -1
+        for k in range(number):
+            row = maxima[k]
+            sign = 1 if values[row] > 0 else -1
+            found = labels[before, row + 1]
+            if not _continues(chains, found, sign, column, row, slope):
+                found = -1
+                for other in (
+                    labels[before, row],
+                    labels[before, row + 2],
+                    labels[earlier, row + 1],
+                    labels[earlier, row],
+                    labels[earlier, row + 2],
+                ):
+                    if _continues(chains, other, sign, column, row, slope):
+                        found = other
                         break
-                if found >= 0:
-                    break
             if found < 0:
                 if used == limit:
                     continue
                 found = used
                 used += 1
-                start_column[found] = column
-                first_row[found] = row
-                sign[found] = rising
-                count[found] = 0
-                total_rows[found] = 0.0
-                total_strength[found] = 0.0
-            labels[now, row] = found
-            last_column[found] = column
-            last_row[found] = row
-            count[found] += 1
-            total_rows[found] += row
-            total_strength[found] += size
+                chains[found] = 0
+                chains[found, _START] = column
+                chains[found, _FIRST] = row
+                chains[found, _SIGN] = sign
+            labels[now, row + 1] = found
+            chains[found, _LAST] = column
+            chains[found, _LAST_ROW] = row
+            chains[found, _COUNT] += 1
+            chains[found, _ROWS] += row
+            chains[found, _SIZES] += abs(np.int32(values[row]))
+    table = np.empty((used, 6), np.float64)
     kept = 0
     for label in range(used):
-        if last_column[label] + 1 - start_column[label] < shortest:
-            continue
-        table[kept, 0] = start_column[label]
-        table[kept, 1] = last_column[label] + 1
-        table[kept, 2] = total_rows[label] / count[label] + 0.5
-        table[kept, 3] = total_strength[label] / count[label]
-        table[kept, 4] = sign[label]
-        table[kept, 5] = last_row[label] - first_row[label]
-        kept += 1
+        one = chains[label]
+        if one[_LAST] + 1 - one[_START] >= shortest:
+            table[kept, X0] = one[_START]
+            table[kept, X1] = one[_LAST] + 1
+            table[kept, Y] = one[_ROWS] / one[_COUNT] + 0.5
+            table[kept, STRENGTH] = one[_SIZES] / one[_COUNT]
+            table[kept, SIGN] = one[_SIGN]
+            table[kept, RISE] = one[_LAST_ROW] - one[_FIRST]
+            kept += 1
     return table[:kept]
 
 
@@ -140,5 +160,5 @@ def find_segments(
         the lower edge of a shadow), and the rise in rows from end to end.
     """
     columns = np.ascontiguousarray(cv2.transpose(derivative))
-    found: Floats = _chain(columns, threshold, slope, shortest, limit)
+    found: Floats = _chain(columns, np.int16(np.ceil(threshold)), slope, shortest, limit)
     return found

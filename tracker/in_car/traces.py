@@ -89,8 +89,60 @@ def _costs(mean, covariance, width, kind, x, y, wide, kinds):  # type: ignore[no
     return costs
 
 
+@njit(cache=True)
+def _slopes(history):  # type: ignore[no-untyped-def]
+    """Fit lines through histories (N, K), where not a number is a gap.
+
+    Returns:
+        (N,) slopes, px a frame, 0 where there are fewer than two points, and (N,) numbers of points.
+    """
+    number, length = history.shape
+    slopes, counts = np.zeros(number), np.zeros(number, np.int64)
+    for i in range(number):
+        count, time, value = 0, 0.0, 0.0
+        for k in range(length):
+            if not np.isnan(history[i, k]):
+                count += 1
+                time += k
+                value += history[i, k]
+        counts[i] = count
+        if count < 2:
+            continue
+        time, value = time / count, value / count
+        power, product = 0.0, 0.0
+        for k in range(length):
+            if not np.isnan(history[i, k]):
+                power += (k - time) ** 2
+                product += (k - time) * (history[i, k] - value)
+        slopes[i] = product / power
+    return slopes, counts
+
+
+def _record(fit: int) -> np.dtype[np.void]:
+    """Return what is kept of a trace: mean and covariance of position and velocity in x and y, and the last x."""
+    return np.dtype(
+        [
+            ("id", np.int64),
+            ("mean", np.float64, (2, 2)),
+            ("covariance", np.float64, (2, 2, 2)),
+            ("width", np.float64),
+            ("history", np.float64, fit),
+            ("hits", np.int64),
+            ("age", np.int64),
+            ("missed", np.int64),
+            ("source", np.int64),
+            ("kind", np.uint8),
+        ],
+        align=True,
+    )
+
+
 class TraceStore:
-    """Keeps the traces of an episode."""
+    """Keeps the traces of an episode.
+
+    Attributes:
+        live: (N,) records, in the order in which they began (`_record`).
+    """
 
     def __init__(self, *, rate: float, fit_seconds: float = 0.4, patience_seconds: float = 0.2) -> None:
         """Start without traces.
@@ -101,21 +153,9 @@ class TraceStore:
             patience_seconds: A trace without centre for longer ends.
         """
         self._rate = rate
-        self._fit = max(4, round(fit_seconds * rate))
         self._patience = max(2, round(patience_seconds * rate))
-        self._transition_x, self._noise_x = kalman.constant_velocity(1.0 / rate, AGILITY_X)
-        self._transition_y, self._noise_y = kalman.constant_velocity(1.0 / rate, AGILITY_Y)
         self._next_id = 1
-        self.ids = np.zeros(0, np.int64)
-        self.mean = np.zeros((0, 2, 2))
-        self._covariance = np.zeros((0, 2, 2, 2))
-        self.width = np.zeros(0)
-        self._kind = np.zeros(0, np.uint8)
-        self.hits = np.zeros(0, np.int64)
-        self.age = np.zeros(0, np.int64)
-        self.missed = np.zeros(0, np.int64)
-        self._history = np.zeros((0, self._fit))
-        self.source = np.zeros(0, np.int64)
+        self.live = np.zeros(0, _record(max(4, round(fit_seconds * rate))))
 
     def step(self, centres: Centres, shift: float = 0.0) -> None:
         """Advance by one frame.
@@ -125,99 +165,64 @@ class TraceStore:
             shift: Vertical jump of the whole picture since the last frame, px, where it is known (pitch).
         """
         self._predict(shift)
-        cost = self._costs(centres)
-        rows, columns = assign(cost, GATE)
-        self._correct(rows, columns, centres)
-        self._prune()
-        taken = np.zeros(len(centres.x), bool)
-        taken[columns] = True
-        self._begin(np.flatnonzero(~taken), centres)
-
-    def slopes(self) -> tuple[Floats, Floats]:
-        """Return v and its standard deviation, (N,) each, px/s."""
-        times = (np.arange(self._fit) - (self._fit - 1)) / self._rate
-        valid = np.isfinite(self._history)
-        count = valid.sum(1)
-        weight = valid / np.maximum(count, 1)[:, None]
-        values = np.where(valid, self._history, 0.0)
-        mean_time, mean_value = weight @ times, (weight * values).sum(1)
-        offset = np.where(valid, times - mean_time[:, None], 0.0)
-        power = (offset * offset).sum(1)
-        slope = (offset * (values - mean_value[:, None])).sum(1) / np.maximum(power, 1e-9)
-        return np.where(count >= 2, slope, 0.0), slope_error(NOISE_X, self._rate, count)
-
-    def _predict(self, shift: float) -> None:
-        self.mean[:, 0], self._covariance[:, 0] = kalman.predict(
-            self.mean[:, 0], self._covariance[:, 0], self._transition_x, self._noise_x
-        )
-        self.mean[:, 1], self._covariance[:, 1] = kalman.predict(
-            self.mean[:, 1], self._covariance[:, 1], self._transition_y, self._noise_y
-        )
-        self.mean[:, 1, 0] += shift
-        self.age += 1
-        self.missed += 1
-        self._history = np.roll(self._history, -1, axis=1)
-        self._history[:, -1] = np.nan
-
-    def _costs(self, centres: Centres) -> Floats:
-        costs: Floats = _costs(
-            self.mean,
-            self._covariance,
-            self.width,
-            self._kind,
+        live = self.live
+        cost = _costs(
+            live["mean"],
+            live["covariance"],
+            live["width"],
+            live["kind"],
             centres.x,
             centres.y,
             centres.width,
             centres.kind,
         )
-        return costs
+        rows, columns = assign(cost, GATE)
+        self._correct(rows, columns, centres)
+        # A trace that has barely begun is given up sooner: most of these are noise.
+        patient = live["missed"] <= np.where(live["hits"] >= 4, self._patience, 1)
+        taken = np.zeros(len(centres.x), bool)
+        taken[columns] = True
+        self.live = np.concatenate([live[patient], self._begin(np.flatnonzero(~taken), centres)])
+
+    def slopes(self) -> tuple[Floats, Floats]:
+        """Return v and its standard deviation, (N,) each, px/s."""
+        slope, count = _slopes(self.live["history"])
+        return slope * self._rate, slope_error(NOISE_X, self._rate, count)
+
+    def _predict(self, shift: float) -> None:
+        live = self.live
+        for axis, agility in enumerate((AGILITY_X, AGILITY_Y)):
+            kalman.predict(live["mean"][:, axis], live["covariance"][:, axis], 1.0 / self._rate, agility)
+        live["mean"][:, 1, 0] += shift
+        live["age"] += 1
+        live["missed"] += 1
+        live["source"] = -1
+        history = live["history"]
+        history[:, :-1] = history[:, 1:]
+        history[:, -1] = np.nan
 
     def _correct(self, rows: Ids, columns: Ids, centres: Centres) -> None:
-        self.source = np.full(len(self.ids), -1, np.int64)
-        if not len(rows):
-            return
-        observation = np.array([[1.0, 0.0]])
+        live = self.live
         for axis, measured, noise in ((0, centres.x, NOISE_X), (1, centres.y, NOISE_Y)):
-            self.mean[rows, axis], self._covariance[rows, axis] = kalman.update(
-                self.mean[rows, axis],
-                self._covariance[rows, axis],
-                measured[columns, None],
-                observation,
-                np.array([[noise**2]]),
+            kalman.update(
+                live["mean"][:, axis], live["covariance"][:, axis], rows, measured[columns], noise**2
             )
-        self.width[rows] += 0.2 * (centres.width[columns] - self.width[rows])
-        self._history[rows, -1] = centres.x[columns]
-        self.hits[rows] += 1
-        self.missed[rows] = 0
-        self.source[rows] = columns
+        live["width"][rows] += 0.2 * (centres.width[columns] - live["width"][rows])
+        live["history"][rows, -1] = centres.x[columns]
+        live["hits"][rows] += 1
+        live["missed"][rows] = 0
+        live["source"][rows] = columns
 
-    def _prune(self) -> None:
-        # A trace that has barely begun is given up sooner: most of these are noise.
-        alive = self.missed <= np.where(self.hits >= 4, self._patience, 1)
-        self._keep(alive)
-
-    def _keep(self, chosen: NDArray[np.bool_]) -> None:
-        self.ids, self.mean, self._covariance = self.ids[chosen], self.mean[chosen], self._covariance[chosen]
-        self.width, self._kind, self.hits = self.width[chosen], self._kind[chosen], self.hits[chosen]
-        self.age, self.missed = self.age[chosen], self.missed[chosen]
-        self._history, self.source = self._history[chosen], self.source[chosen]
-
-    def _begin(self, fresh: Ids, centres: Centres) -> None:
-        count = len(fresh)
-        mean = np.zeros((count, 2, 2))
-        mean[:, 0, 0], mean[:, 1, 0] = centres.x[fresh], centres.y[fresh]
-        covariance = np.tile(np.diag([NOISE_X**2, 40.0**2]), (count, 2, 1, 1))
-        covariance[:, 1] = np.diag([NOISE_Y**2, 20.0**2])
-        history = np.full((count, self._fit), np.nan)
-        history[:, -1] = centres.x[fresh]
-        self.ids = np.concatenate([self.ids, self._next_id + np.arange(count)])
-        self._next_id += count
-        self.mean = np.concatenate([self.mean, mean])
-        self._covariance = np.concatenate([self._covariance, covariance])
-        self.width = np.concatenate([self.width, centres.width[fresh]])
-        self._kind = np.concatenate([self._kind, centres.kind[fresh]])
-        self.hits = np.concatenate([self.hits, np.ones(count, np.int64)])
-        self.age = np.concatenate([self.age, np.zeros(count, np.int64)])
-        self.missed = np.concatenate([self.missed, np.zeros(count, np.int64)])
-        self._history = np.concatenate([self._history, history])
-        self.source = np.concatenate([self.source, fresh])
+    def _begin(self, fresh: Ids, centres: Centres) -> NDArray[np.void]:
+        begun = np.zeros(len(fresh), self.live.dtype)
+        begun["id"] = self._next_id + np.arange(len(fresh))
+        self._next_id += len(fresh)
+        begun["mean"][:, 0, 0], begun["mean"][:, 1, 0] = centres.x[fresh], centres.y[fresh]
+        begun["covariance"] = np.array(
+            [np.diag([NOISE_X**2, 40.0**2]), np.diag([NOISE_Y**2, 20.0**2])]
+        )
+        begun["history"] = np.nan
+        begun["history"][:, -1] = centres.x[fresh]
+        begun["width"], begun["kind"] = centres.width[fresh], centres.kind[fresh]
+        begun["hits"], begun["source"] = 1, fresh
+        return begun

@@ -12,31 +12,43 @@ from tracker.filtering import kalman
 from tracker.filtering.assignment import assign
 
 
-def test_prediction_of_constant_velocity():
-    transition, noise = kalman.constant_velocity(0.1, 4.0, axes=2)
-    mean, covariance = kalman.predict(
-        np.array([[1.0, 2.0, 3.0, -1.0]]), np.zeros((1, 4, 4)), transition, noise
-    )
-    assert np.allclose(mean, [[1.2, 2.0, 2.9, -1.0]])
-    assert np.allclose(covariance[0, :2, :2], 4.0 * np.array([[0.1**3 / 3, 0.005], [0.005, 0.1]]))
-    assert np.allclose(covariance[0, :2, 2:], 0)
+def _targets(rng, count):
+    """Means (N, 2) and covariances (N, 2, 2)."""
+    root = rng.normal(size=(count, 2, 2))
+    return rng.normal(size=(count, 2)), root @ np.swapaxes(root, 1, 2) + 0.1 * np.eye(2)
 
 
-@given(st.integers(0, 10_000))
+@given(st.integers(0, 10_000), st.floats(0.01, 1.0), st.floats(0.0, 50.0))
 @settings(max_examples=30, deadline=None)
-def test_update_is_the_textbook_one(seed):
-    rng = np.random.default_rng(seed)
-    mean = rng.normal(size=(5, 3))
-    root = rng.normal(size=(5, 3, 3))
-    covariance = root @ np.swapaxes(root, 1, 2) + np.eye(3)
-    observation, noise = rng.normal(size=(2, 3)), np.diag(rng.uniform(0.5, 2, 2))
-    measured = rng.normal(size=(5, 2))
-    new_mean, new_covariance = kalman.update(mean, covariance, measured, observation, noise)
+def test_prediction_is_the_textbook_one(seed, step, intensity):
+    before, spread = _targets(np.random.default_rng(seed), 5)
+    mean, covariance = before.copy(), spread.copy()
+    kalman.predict(mean, covariance, step, intensity)
+    transition = np.array([[1.0, step], [0.0, 1.0]])
+    noise = intensity * np.array([[step**3 / 3, step**2 / 2], [step**2 / 2, step]])
     for i in range(5):
-        spread = observation @ covariance[i] @ observation.T + noise
-        gain = covariance[i] @ observation.T @ np.linalg.inv(spread)
-        assert np.allclose(new_mean[i], mean[i] + gain @ (measured[i] - observation @ mean[i]))
-        assert np.allclose(new_covariance[i], (np.eye(3) - gain @ observation) @ covariance[i])
+        assert np.allclose(mean[i], transition @ before[i])
+        assert np.allclose(covariance[i], transition @ spread[i] @ transition.T + noise)
+
+
+@given(st.integers(0, 10_000), st.floats(0.01, 10.0))
+@settings(max_examples=30, deadline=None)
+def test_update_is_the_textbook_one(seed, noise):
+    rng = np.random.default_rng(seed)
+    before, spread = _targets(rng, 5)
+    mean, covariance = before.copy(), spread.copy()
+    rows, measured = np.array([4, 0, 2]), rng.normal(size=3)
+    kalman.update(mean, covariance, rows, measured, noise)
+    observation = np.array([[1.0, 0.0]])
+    for i in range(5):
+        if i not in rows:
+            assert np.array_equal(mean[i], before[i])
+            assert np.array_equal(covariance[i], spread[i])
+            continue
+        position = measured[rows.tolist().index(i)]
+        gain = spread[i] @ observation.T @ np.linalg.inv(observation @ spread[i] @ observation.T + noise)
+        assert np.allclose(mean[i], before[i] + gain @ (position - observation @ before[i]))
+        assert np.allclose(covariance[i], (np.eye(2) - gain @ observation) @ spread[i])
 
 
 def _best(cost, gate):

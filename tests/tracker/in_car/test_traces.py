@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.in_car.profile import SEGMENT, Centres
-from tracker.in_car.traces import TraceStore, slope_error
+from tracker.in_car.traces import TraceStore, _slopes, slope_error
 
 RATE = 30.0
 
@@ -30,7 +30,7 @@ def test_slope_and_identity_of_two_crossing_rows():
     for tick in range(40):
         # At the same x in the middle of the time, but at different heights.
         store.step(centres((200 + tick, 100), (240 - tick, 160)))
-    assert store.ids.tolist() == [1, 2]
+    assert store.live["id"].tolist() == [1, 2]
     slope, error = store.slopes()
     assert np.allclose(slope, [RATE, -RATE], atol=1e-6)
     assert (error > 0).all()
@@ -42,8 +42,8 @@ def test_a_short_gap_keeps_the_id_and_a_long_one_does_not():
         gone = 15 <= tick < 19 or 28 <= tick < 38
         store.step(centres() if gone else centres((100 + tick, 50)))
         if tick == 27:
-            assert store.ids.tolist() == [1]
-    assert store.ids.tolist() == [2]
+            assert store.live["id"].tolist() == [1]
+    assert store.live["id"].tolist() == [2]
 
 
 def test_slope_error_is_that_of_a_line_fit():
@@ -51,3 +51,14 @@ def test_slope_error_is_that_of_a_line_fit():
     times = np.arange(12) / RATE
     slopes = [np.polyfit(times, rng.normal(0, 0.5, 12), 1)[0] for _ in range(4000)]
     assert np.isclose(np.std(slopes), slope_error(0.5, RATE, np.array([12]))[0], rtol=0.05)
+
+
+def test_slopes_are_those_of_fitted_lines():
+    rng = np.random.default_rng(1)
+    history = rng.normal(0, 5, (40, 12)) + np.linspace(0, 30, 12)
+    history[rng.random(history.shape) < 0.5] = np.nan
+    slopes, counts = _slopes(history)
+    for row, slope, count in zip(history, slopes, counts, strict=True):
+        times = np.flatnonzero(np.isfinite(row))
+        assert count == len(times)
+        assert np.isclose(slope, np.polyfit(times, row[times], 1)[0] if count >= 2 else 0.0)
