@@ -16,6 +16,9 @@ Floats = NDArray[np.float64]
 WORKING_WIDTH = 640
 # Lamps are searched where the mean brightness lies below this, in full below the half of it.
 DUSK = 80.0
+# Brings the corner response of whole numbers to cv2's units, grey levels over 255: squares of Sobel's 4 and
+# of a window of 3.
+RESPONSE_UNIT = 1.0 / (4.0 * 3.0 * 255.0) ** 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,9 +174,60 @@ def find_corners(
     return found
 
 
-def corner_response(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return the smaller eigenvalue of the structure tensor (H, W), in cv2's units."""
-    return np.asarray(cv2.cornerMinEigenVal(grey, 3, ksize=3), np.float32)
+@njit(cache=True)
+def _weaker(grey, first, last):  # type: ignore[no-untyped-def]
+    height, width = grey.shape
+    response = np.zeros((last - first, width), np.float32)
+    # Of one row: sums and differences over three rows, and products of the gradients.
+    smooth, step = np.zeros(width, np.int32), np.zeros(width, np.int32)
+    products = np.zeros((3, width), np.int32)
+    # Of the last three rows: the products summed over three columns.
+    sums = np.zeros((3, 3, width), np.int32)
+    unit, half = np.float32(RESPONSE_UNIT), np.float32(0.5)
+    begin = max(first - 1, 1)
+    for i in range(begin, min(last + 1, height - 1)):
+        above, here, below = grey[i - 1], grey[i], grey[i + 1]
+        for j in range(width):
+            smooth[j] = np.int32(above[j]) + 2 * np.int32(here[j]) + np.int32(below[j])
+            step[j] = np.int32(below[j]) - np.int32(above[j])
+        left, right = smooth[: width - 2], smooth[2:]
+        before, middle, after = step[: width - 2], step[1 : width - 1], step[2:]
+        pxx, pxy, pyy = products[0, 1 : width - 1], products[1, 1 : width - 1], products[2, 1 : width - 1]
+        for j in range(width - 2):
+            x, y = right[j] - left[j], before[j] + 2 * middle[j] + after[j]
+            pxx[j], pxy[j], pyy[j] = x * x, x * y, y * y
+        for k in range(3):
+            product, total = products[k], sums[k, i % 3, 1 : width - 1]
+            for j in range(width - 2):
+                total[j] = product[j] + product[j + 1] + product[j + 2]
+        if i < begin + 2:
+            continue
+        result = response[i - 1 - first, 2 : width - 2]
+        xx0, xx1, xx2 = sums[0, 0, 2 : width - 2], sums[0, 1, 2 : width - 2], sums[0, 2, 2 : width - 2]
+        xy0, xy1, xy2 = sums[1, 0, 2 : width - 2], sums[1, 1, 2 : width - 2], sums[1, 2, 2 : width - 2]
+        yy0, yy1, yy2 = sums[2, 0, 2 : width - 2], sums[2, 1, 2 : width - 2], sums[2, 2, 2 : width - 2]
+        for j in range(width - 4):
+            xx = half * np.float32(xx0[j] + xx1[j] + xx2[j])
+            yy = half * np.float32(yy0[j] + yy1[j] + yy2[j])
+            xy = np.float32(xy0[j] + xy1[j] + xy2[j])
+            result[j] = unit * (xx + yy - np.sqrt((xx - yy) * (xx - yy) + xy * xy))
+    return response
+
+
+def corner_response(grey: NDArray[np.uint8], first: int, last: int) -> NDArray[np.float32]:
+    """Return the smaller eigenvalue of the structure tensor in rows [first, last).
+
+    Args:
+        grey: (H, W).
+        first: Row, >= 0.
+        last: Row, <= H.
+
+    Returns:
+        (last - first, W): of 3 x 3 Sobel gradients summed over 3 x 3 px, in cv2's units; 0 within two pixels
+        of the picture's edge.
+    """
+    found: NDArray[np.float32] = _weaker(grey, first, last)
+    return found
 
 
 @njit(cache=True)

@@ -62,6 +62,8 @@ class PointStore:
         self.age = np.zeros(0, np.int64)
         self.evidence = np.zeros(0)
         self.owner = np.zeros(0, np.int64)
+        # Rings of the last positions and of the rotation's part in them, `_now` the latest.
+        self._now = 0
         self._past = np.zeros((0, memory, 2))
         self._turned = np.zeros((0, memory, 2))
 
@@ -102,8 +104,8 @@ class PointStore:
             good &= (self.age < 1) | (change < 3.0 + 0.3 * np.abs(self.flow).max(1))
             self.flow = place - self.position
             self.position = place
+            good[good] = _apart(place[good])
             self._keep(good)
-            self._keep(_apart(self.position))
             self.age += 1
         self._last = grey
 
@@ -112,11 +114,10 @@ class PointStore:
 
         With the flow that the camera's rotation caused since the last one (N, 2).
         """
-        total = self._turned[:, -1] + turned
-        self._past = np.roll(self._past, -1, axis=1)
-        self._turned = np.roll(self._turned, -1, axis=1)
-        self._past[:, -1] = self.position
-        self._turned[:, -1] = total
+        total = self._turned[:, self._now] + turned
+        self._now = (self._now + 1) % self._memory
+        self._past[:, self._now] = self.position
+        self._turned[:, self._now] = total
 
     def displacement(self) -> tuple[Floats, Floats]:
         """Return how far each point moved over its remembered past, rotation removed (N, 2).
@@ -125,14 +126,14 @@ class PointStore:
         """
         span = np.minimum(self.age, self._memory - 1)
         rows = np.arange(len(self))
-        then = self._memory - 1 - span
-        moved = self._past[:, -1] - self._past[rows, then]
-        turned = self._turned[:, -1] - self._turned[rows, then]
+        then = (self._now - span) % self._memory
+        moved = self._past[:, self._now] - self._past[rows, then]
+        turned = self._turned[:, self._now] - self._turned[rows, then]
         return moved - turned, span.astype(float)
 
     def frozen(self, *, play: float = 0.4) -> NDArray[np.bool_]:
         """Tell which points (N,) have not moved in the picture at all over their remembered past."""
-        moved = np.abs(self._past - self._past[:, -1:]).max(axis=(1, 2))
+        moved = np.abs(self._past - self.position[:, None]).max(axis=(1, 2))
         return np.asarray((moved < play) & (self.age >= 4))
 
     def refill(self, grey: NDArray[np.uint8], horizon: float) -> None:
@@ -161,7 +162,7 @@ class PointStore:
         held = int(inside.sum())
         if held >= quota:
             return
-        response = corner_response(grey[first:last])
+        response = corner_response(grey, first, last)
         taken = np.zeros(response.shape, np.uint8)
         taken[rows[inside], np.clip(self.position[inside, 0].astype(np.int64), 0, grey.shape[1] - 1)] = 1
         # A corner has to stand out from the noise and the texture of its part of the picture.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -138,13 +139,22 @@ def test_corners_are_the_best_of_their_free_cells(seed, cell):
     )
 
 
+@given(st.integers(0, 10_000), st.integers(0, 10), st.integers(12, 24))
+@settings(max_examples=20, deadline=None)
+def test_corner_response_is_that_of_opencv(seed, first, last):
+    grey = np.random.default_rng(seed).integers(0, 256, (24, 31), dtype=np.uint8)
+    expected = cv2.cornerMinEigenVal(grey, 3, ksize=3)
+    expected[:2] = expected[-2:] = expected[:, :2] = expected[:, -2:] = 0
+    assert np.allclose(corner_response(grey, first, last), expected[first:last], rtol=1e-4, atol=1e-6)
+
+
 def test_an_edge_is_stiff_across_and_slack_along():
     grey = np.full((40, 40), 50, np.uint8)
     grey[:, 20:] = 200
     place = np.array([[20.0, 20.0]])
     assert stiffness(grey, place, np.array([[0.0, 1.0]]))[0] < 1e-6
     grey[20:] = 50
-    assert corner_response(grey).max() > 1e-4
+    assert corner_response(grey, 0, 40).max() > 1e-4
     assert stiffness(grey, place, np.array([[0.0, 1.0]]))[0] > 0.3
 
 
