@@ -81,8 +81,8 @@ def long_lines(grey: Grey) -> NDArray[np.float64]:
 
 
 def corners(grey: Grey) -> NDArray[np.float64]:
-    free = np.zeros_like(grey)
-    return np.array([float(len(find_corners(corner_response(grey), free, CORNER_CELL, CORNER_LEAST, 4000)))])
+    response, held = corner_response(grey, 0, len(grey)), np.zeros((0, 2), np.int64)
+    return np.array([float(len(find_corners(response, held, CORNER_CELL, CORNER_LEAST, 4000)))])
 
 
 def peaks(grey: Grey) -> NDArray[np.float64]:

@@ -31,7 +31,7 @@ FRAME_SIDE = 1.5
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Relief:
-    """Integral images (h + 1, w + 1) of a picture's edges, in half grey levels, and what is known of the scene.
+    """Integral images (h + 1, w + 1) of a picture's edges, in half grey levels, and the scene's geometry.
 
     Attributes:
         across: Of the absolute steps from one column to the next.

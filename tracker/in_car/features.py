@@ -133,22 +133,17 @@ def _select(response, least, cell, taken, limit):  # type: ignore[no-untyped-def
     height, width = response.shape
     places = np.empty((limit, 2), np.float32)
     used = 0
-    for row in range(0, height, cell):
-        lower = min(row + cell, height)
-        for column in range(0, width, cell):
-            right = min(column + cell, width)
-            best, best_i, best_j, free = least, -1, -1, True
-            for i in range(row, lower):
-                for j in range(column, right):
-                    if taken[i, j] != 0:
-                        free = False
-                        break
+    for down in range(taken.shape[0]):
+        for right in range(taken.shape[1]):
+            if taken[down, right]:
+                continue
+            best, best_i, best_j = least, -1, -1
+            for i in range(down * cell, min(down * cell + cell, height)):
+                for j in range(right * cell, min(right * cell + cell, width)):
                     if response[i, j] > best:
                         best = response[i, j]
                         best_i, best_j = i, j
-                if not free:
-                    break
-            if free and best_i >= 0 and used < limit:
+            if best_i >= 0 and used < limit:
                 places[used, 0] = best_j
                 places[used, 1] = best_i
                 used += 1
@@ -156,13 +151,13 @@ def _select(response, least, cell, taken, limit):  # type: ignore[no-untyped-def
 
 
 def find_corners(
-    response: NDArray[np.float32], taken: NDArray[np.uint8], cell: int, least: float, limit: int
+    response: NDArray[np.float32], held: NDArray[np.int64], cell: int, least: float, limit: int
 ) -> NDArray[np.float32]:
     """Find corners: the best one of each free cell of a grid.
 
     Args:
         response: (H, W) smaller eigenvalue of the structure tensor (`corner_response`).
-        taken: (H, W), non-zero at points that are followed already; their cells get no new point.
+        held: (K, 2) column, row of the points that are followed already; their cells get no new point.
         cell: Side of a cell, px.
         least: Least response.
         limit: Corners returned at most.
@@ -170,6 +165,9 @@ def find_corners(
     Returns:
         (N, 2) float32 column, row, in reading order of the cells.
     """
+    height, width = response.shape
+    taken = np.zeros((-(-height // cell), -(-width // cell)), np.bool_)
+    taken[held[:, 1] // cell, held[:, 0] // cell] = True
     found: NDArray[np.float32] = _select(response, least, cell, taken, limit)
     return found
 

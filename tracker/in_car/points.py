@@ -157,21 +157,21 @@ class PointStore:
 
     def _search(self, grey: NDArray[np.uint8], first: int, last: int, cell: int, quota: int) -> None:
         """Add the best corners of free cells in rows [first, last) until there are ``quota`` points."""
-        rows = self.position[:, 1].astype(np.int64) - first
-        inside = (rows >= 0) & (rows < last - first)
-        held = int(inside.sum())
-        if held >= quota:
+        places = self.position.astype(np.int64) - np.array([0, first])
+        held = places[(places[:, 1] >= 0) & (places[:, 1] < last - first)]
+        room = quota - len(held)
+        if room <= 0:
             return
         response = corner_response(grey, first, last)
-        taken = np.zeros(response.shape, np.uint8)
-        taken[rows[inside], np.clip(self.position[inside, 0].astype(np.int64), 0, grey.shape[1] - 1)] = 1
-        # A corner has to stand out from the noise and the texture of its part of the picture.
-        least = float(np.clip(6.0 * np.median(response[::4, ::4]), 1e-4, 4e-4))
-        corners = find_corners(response, taken, cell, least, 4 * quota)
-        if held + len(corners) > quota:
+        # A corner has to stand out from the noise and the texture of its part of the picture: its median.
+        sample = response[::4, ::4].ravel()
+        middle = np.partition(sample, sample.size // 2)[sample.size // 2]
+        least = float(np.clip(6.0 * middle, 1e-4, 4e-4))
+        corners = find_corners(response, held, cell, least, 4 * quota)
+        if len(corners) > room:
             # The strongest of those there is room for.
             strength = response[corners[:, 1].astype(np.int64), corners[:, 0].astype(np.int64)]
-            corners = corners[np.sort(np.argsort(-strength, kind="stable")[: quota - held])]
+            corners = corners[np.sort(np.argsort(-strength, kind="stable")[:room])]
         self._add(corners.astype(np.float64) + np.array([0.5, 0.5 + first]))
 
     def drop(self, gone: NDArray[np.bool_]) -> None:

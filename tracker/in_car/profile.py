@@ -62,6 +62,20 @@ def band_rows(horizon: float, height: int, width: int) -> tuple[int, int]:
     return top, bottom
 
 
+@njit(cache=True)
+def _condense(spans, weights, width):  # type: ignore[no-untyped-def]
+    begun, ended = np.zeros(width + 1), np.zeros(width + 1)
+    for k in range(weights.size):
+        begun[min(max(int(spans[k, 0]), 0), width)] += weights[k]
+        ended[min(max(int(spans[k, 1]), 0), width)] += weights[k]
+    profile = np.empty(width, np.float32)
+    total = 0.0
+    for column in range(width):
+        total += begun[column] - ended[column]
+        profile[column] = total
+    return profile
+
+
 def condense(spans: Floats, weights: Floats, width: int) -> Profile:
     """Sum weighted spans [x0, x1) over the columns.
 
@@ -73,10 +87,8 @@ def condense(spans: Floats, weights: Floats, width: int) -> Profile:
     Returns:
         (width,) profile: at each column the weights of the spans that cover it.
     """
-    start = np.clip(spans[:, 0].astype(np.int64), 0, width)
-    end = np.clip(spans[:, 1].astype(np.int64), 0, width)
-    steps = np.bincount(start, weights, width + 1) - np.bincount(end, weights, width + 1)
-    return np.cumsum(steps)[:width].astype(np.float32)
+    found: Profile = _condense(spans, weights, width)
+    return found
 
 
 def smooth(profile: Profile, sigma: float) -> Profile:
@@ -167,6 +179,34 @@ def local_maxima(profile, least, radius):  # type: ignore[no-untyped-def]
     return places[:used]
 
 
+@njit(cache=True)
+def _strongest(middle, weight, peaks, reach, layers):  # type: ignore[no-untyped-def]
+    """Choose the heaviest clusters at each maximum of the profile.
+
+    Args:
+        middle: (G,) px, of the clusters.
+        weight: (G,).
+        peaks: (P,) columns of the maxima, ascending.
+        reach: A chosen cluster is no farther from its maximum, px.
+        layers: Clusters chosen at a maximum.
+
+    Returns:
+        (G,) bool.
+    """
+    chosen = np.zeros(middle.size, np.bool_)
+    if peaks.size == 0:
+        return chosen
+    room = np.full(peaks.size, layers)
+    for k in np.argsort(-weight, kind="mergesort"):
+        nearest = min(np.searchsorted(peaks, middle[k]), peaks.size - 1)
+        if nearest > 0 and middle[k] - peaks[nearest - 1] <= abs(peaks[nearest] - middle[k]):
+            nearest -= 1
+        if room[nearest] > 0:
+            room[nearest] -= 1
+            chosen[k] = abs(middle[k] - (peaks[nearest] + 0.5)) <= reach
+    return chosen
+
+
 def find_centres(
     features: Features,
     segment_profile: Profile,
@@ -220,21 +260,3 @@ def find_centres(
         points=np.concatenate([np.stack([0.5 * (x0 + x1), y], 1)[member], lamps[:, :2]]),
         owners=np.concatenate([renumber[group[member]], kept + np.arange(len(lamps))]),
     )
-
-
-def _strongest(
-    middle: Floats, weight: Floats, peaks: NDArray[np.int64], reach: float, layers: int
-) -> NDArray[np.bool_]:
-    """Choose the heaviest clusters at each maximum of the profile."""
-    chosen = np.zeros(len(middle), bool)
-    if not len(peaks) or not len(middle):
-        return chosen
-    right = np.clip(np.searchsorted(peaks, middle), 1, max(len(peaks) - 1, 1))
-    left = right - 1
-    right = np.minimum(right, len(peaks) - 1)
-    nearer = np.where(np.abs(middle - peaks[left]) <= np.abs(middle - peaks[right]), left, right)
-    order = np.lexsort((-weight, nearer))
-    first = np.searchsorted(nearer[order], nearer[order])
-    place = np.arange(len(order)) - first
-    chosen[order] = place < layers
-    return chosen & (np.abs(middle - (peaks[nearer] + 0.5)) <= reach)

@@ -119,7 +119,7 @@ def _slopes(history):  # type: ignore[no-untyped-def]
 
 
 def _record(fit: int) -> np.dtype[np.void]:
-    """Return what is kept of a trace: mean and covariance of position and velocity in x and y, and the last x."""
+    """Return what is kept of a trace: its state and covariance in x and y, and its last x."""
     return np.dtype(
         [
             ("id", np.int64),
@@ -218,9 +218,7 @@ class TraceStore:
         begun["id"] = self._next_id + np.arange(len(fresh))
         self._next_id += len(fresh)
         begun["mean"][:, 0, 0], begun["mean"][:, 1, 0] = centres.x[fresh], centres.y[fresh]
-        begun["covariance"] = np.array(
-            [np.diag([NOISE_X**2, 40.0**2]), np.diag([NOISE_Y**2, 20.0**2])]
-        )
+        begun["covariance"] = np.array([np.diag([NOISE_X**2, 40.0**2]), np.diag([NOISE_Y**2, 20.0**2])])
         begun["history"] = np.nan
         begun["history"][:, -1] = centres.x[fresh]
         begun["width"], begun["kind"] = centres.width[fresh], centres.kind[fresh]

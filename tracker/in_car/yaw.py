@@ -67,6 +67,47 @@ def _rotation(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _lines(position, moved, weight, focus):  # type: ignore[no-untyped-def]
+    """Gather the lines along the points' flows, which pass through the focus of expansion.
+
+    Args:
+        position: (N, 2) now.
+        moved: (N, 2) displacement without rotation.
+        weight: (N,) 0 for points that are left out.
+        focus: (2,) as far as it is known: lines that miss it by much count little.
+
+    Returns:
+        Normal equations for the focus, (2, 2) and (2,): information and its product with the focus; and the
+        number of points in them.
+    """
+    information, vector = np.zeros((2, 2)), np.zeros(2)
+    used = 0
+    for i in range(weight.size):
+        u, v = moved[i, 0], moved[i, 1]
+        size = np.hypot(u, v)
+        if weight[i] <= 0.0 or size <= 1.5:
+            continue
+        used += 1
+        x, y = position[i, 0] - 0.5 * u, position[i, 1] - 0.5 * v
+        # n . focus = n . p, n the flow's normal.
+        across, down = -v / size, u / size
+        offset = across * x + down * y
+        distance = max(np.hypot(x - focus[0], y - focus[1]), 5.0)
+        # Angular noise of the flow, carried to the focus.
+        sigma = 1.0 + distance * 2.0 * FLOW_NOISE / size
+        residual = offset - across * focus[0] - down * focus[1]
+        # Neighbouring points and frames share their errors: they count a fraction each.
+        strength = 0.08 * weight[i] / sigma**2 / (1.0 + (residual / (2.0 * sigma)) ** 2)
+        information[0, 0] += strength * across * across
+        information[0, 1] += strength * across * down
+        information[1, 1] += strength * down * down
+        vector[0] += strength * offset * across
+        vector[1] += strength * offset * down
+    information[1, 0] = information[0, 1]
+    return information, vector, used
+
+
+@njit(cache=True)
 def _deposit(pile, places, spreads, weights):  # type: ignore[no-untyped-def]
     """Add a Gaussian of weight ``weights`` at each of ``places`` (in bins) to a histogram, in place."""
     for j in range(places.size):
@@ -184,31 +225,12 @@ class EgoMotion:
         self._learn_ground(position, moved, seconds, weight, speed)
 
     def _learn_focus(self, position: Floats, moved: Floats, weight: Floats) -> None:
-        middle = position - 0.5 * moved
-        size = np.hypot(moved[:, 0], moved[:, 1])
-        use = (weight > 0) & (size > 1.5)
-        if use.sum() < 6:
+        information, vector, used = _lines(position, moved, weight, self.focus)
+        if used < 6:
             return
-        # The line through a point along its flow passes through the focus: n . focus = n . p, n the
-        # flow's normal.
-        normal = np.stack([-moved[use, 1], moved[use, 0]], 1) / size[use, None]
-        offset = (normal * middle[use]).sum(1)
-        distance = np.maximum(np.hypot(*(middle[use] - self.focus).T), 5.0)
-        # Angular noise of the flow, carried to the focus.
-        sigma = 1.0 + distance * 2.0 * FLOW_NOISE / size[use]
-        residual = offset - normal @ self.focus
-        strength = weight[use] / sigma**2 / (1.0 + (residual / (2.0 * sigma)) ** 2)
         forget = 0.985 ** (30.0 / self._rate)
-        # Neighbouring points and frames share their errors: they count a fraction each.
-        strength *= 0.08
-        self._information = (
-            forget * self._information
-            + (1 - forget) * self._prior_information
-            + (normal * strength[:, None]).T @ normal
-        )
-        self._vector = (
-            forget * self._vector + (1 - forget) * self._prior_vector + normal.T @ (strength * offset)
-        )
+        self._information = forget * self._information + (1 - forget) * self._prior_information + information
+        self._vector = forget * self._vector + (1 - forget) * self._prior_vector + vector
         self.focus = np.linalg.solve(self._information, self._vector)
 
     def _learn_ground(

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from tracker.in_car import profile as prof
 from tracker.in_car import segments as seg
-from tracker.in_car.features import _peaks, _select, corner_response, find_lamps, stiffness, working_picture
+from tracker.in_car.features import (
+    _peaks,
+    corner_response,
+    find_corners,
+    find_lamps,
+    stiffness,
+    working_picture,
+)
 
 
 def naive_segments(derivative, threshold, slope, shortest):
@@ -134,9 +141,8 @@ def test_corners_are_the_best_of_their_free_cells(seed, cell):
                 continue
             i, j = np.unravel_index(part.argmax(), part.shape)
             expected.append([column + j, row + i])
-    assert np.array_equal(
-        _select(response, np.float32(0.9), cell, taken, 1000), np.array(expected).reshape(-1, 2)
-    )
+    held = np.argwhere(taken)[:, ::-1]
+    assert np.array_equal(find_corners(response, held, cell, 0.9, 1000), np.array(expected).reshape(-1, 2))
 
 
 @given(st.integers(0, 10_000), st.integers(0, 10), st.integers(12, 24))
@@ -200,6 +206,20 @@ def test_clusters_are_connected_components(seed, count):
         own = expected == k
         means = [np.average(of[own], weights=length[own]) for of in (0.5 * (x0 + x1), y, length)]
         assert np.allclose(sums[k], [length[own].sum(), *means, own.sum()])
+
+
+@given(st.integers(0, 10_000), st.integers(0, 30), st.integers(0, 6))
+@settings(max_examples=30, deadline=None)
+def test_strongest_clusters_are_the_heaviest_at_each_maximum(seed, count, maxima):
+    rng = np.random.default_rng(seed)
+    middle, weight = rng.uniform(0, 100, count), rng.integers(1, 6, count).astype(float)
+    peaks = np.sort(rng.choice(100, maxima, replace=False))
+    chosen = np.zeros(count, bool)
+    for peak in peaks:
+        own = [k for k in range(count) if np.abs(peaks - middle[k]).argmin() == np.flatnonzero(peaks == peak)]
+        for k in sorted(own, key=lambda k: -weight[k])[:2]:
+            chosen[k] = abs(middle[k] - peak - 0.5) <= 8.0
+    assert np.array_equal(prof._strongest(middle, weight, peaks, 8.0, 2), chosen)
 
 
 @given(st.lists(st.integers(0, 6), min_size=1, max_size=60), st.integers(1, 5))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracker.in_car.evidence import motion_evidence
-from tracker.in_car.yaw import HEIGHT, EgoMotion
+from tracker.in_car.yaw import FLOW_NOISE, HEIGHT, EgoMotion, _deposit, _lines
 
 FOCAL, RATE = 800.0, 30.0
 FOCUS = np.array([330.0, 228.0])
@@ -86,3 +86,31 @@ def test_standing_still_says_nothing_against_a_static_thing():
         points, np.zeros((2, 2)), np.full(2, 0.35), ground=0.0, focal=FOCAL, yaw_rate=0.0
     )
     assert (np.abs(ratios) < 1.5).all()
+
+
+def test_lines_of_flow_equal_weighted_least_squares():
+    rng = np.random.default_rng(4)
+    position, moved = rng.uniform(0, 600, (30, 2)), rng.normal(0, 3, (30, 2))
+    weight = rng.choice([0.0, 0.3, 1.0], 30)
+    information, vector, used = _lines(position, moved, weight, FOCUS)
+    size = np.linalg.norm(moved, axis=1)
+    use = (weight > 0) & (size > 1.5)
+    normal = (moved[use] @ np.array([[0.0, 1], [-1, 0]])) / size[use, None]
+    middle = position[use] - moved[use] / 2
+    offset = np.einsum("ij,ij->i", normal, middle)
+    away = np.maximum(np.linalg.norm(middle - FOCUS, axis=1), 5.0)
+    sigma = 1 + 2 * FLOW_NOISE * away / size[use]
+    strength = 0.08 * weight[use] / sigma**2 / (1 + ((offset - normal @ FOCUS) / (2 * sigma)) ** 2)
+    assert used == use.sum()
+    assert np.allclose(information, normal.T @ np.diag(strength) @ normal)
+    assert np.allclose(vector, normal.T @ (strength * offset))
+
+
+def test_deposit_adds_gaussians():
+    rng = np.random.default_rng(5)
+    places, spreads, weights = rng.uniform(-2, 42, 20), rng.uniform(1, 4, 20), rng.uniform(0, 2, 20)
+    pile = np.zeros(40)
+    _deposit(pile, places, spreads, weights)
+    bins = np.arange(40)[:, None]
+    expected = np.exp(-0.5 * ((bins - places) / spreads) ** 2) @ (weights / spreads)
+    assert np.abs(pile - expected).max() < 0.02 * weights.sum()
