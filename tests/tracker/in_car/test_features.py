@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -97,6 +98,14 @@ def test_oblique_edges_are_no_segments():
     grey = np.where(np.add.outer(np.arange(80), np.arange(80)) > 80, 200, 50).astype(np.uint8)
     derivative = seg.vertical_derivative(grey)
     assert len(seg.find_segments(derivative, seg.edge_threshold(derivative))) == 0
+
+
+def test_working_picture_leans_to_red():
+    image = np.random.default_rng(0).integers(0, 256, (40, 60, 3), dtype=np.uint8)
+    picture = working_picture(image)
+    expected = 0.8 * cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) + 0.2 * image[..., 0]
+    assert np.array_equal(picture.grey, np.rint(expected))
+    assert picture.brightness == pytest.approx(picture.grey.mean())
 
 
 @given(st.integers(0, 10_000))
