@@ -19,7 +19,7 @@ from tracker.in_car.features import stiffness, working_picture
 from tracker.in_car.front_end import FrontEnd
 from tracker.in_car.points import PointStore
 from tracker.in_car.traces import TraceSet
-from tracker.in_car.vehicles import CORRELATION, VehicleStore
+from tracker.in_car.vehicles import CORRELATION, Sighting, VehicleStore
 from tracker.in_car.yaw import HEIGHT, EgoMotion
 from tracker.types import Diagnostics, Frame, Info, Label, Status, Traces, Tracks
 
@@ -56,6 +56,11 @@ class InCarTracker:
     def diagnostics(self) -> Diagnostics:
         """Traces and profiles of the last frame."""
         return self._diagnostics
+
+    @property
+    def sighting(self) -> Sighting | None:
+        """The outlines that were weighed in the last frame, if any were."""
+        return self._vehicles.sighting
 
     def step(self, frame: Frame) -> Tracks:
         """Return the tracks of this frame; what was returned is final."""
@@ -98,8 +103,6 @@ class InCarTracker:
             grey,
             points,
             moved * (CORRELATION / np.maximum(seconds, 1e-3))[:, None],
-            ratios,
-            trust,
             ego,
             focal * HEIGHT / REACH,
         )

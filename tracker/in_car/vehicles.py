@@ -1,6 +1,6 @@
 """The vehicles that are tracked.
 
-A box each, carried along by the points on it and held by the picture's edges.
+A box each, carried along by the points on it and held by the picture's outlines.
 """
 
 from __future__ import annotations
@@ -10,46 +10,61 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.in_car.evidence import CLOSING, CLOSING_SHARE
-from tracker.in_car.extent import REAR, SLIMMEST, WIDEST, Relief, clear, make_relief, refine, roof_row
+from tracker.in_car.cues import BODY_PLAY, BODY_SHARE, cues
+from tracker.in_car.outline_odds import log_odds
+from tracker.in_car.outlines import outlines
 from tracker.in_car.points import PointStore
-from tracker.in_car.proposals import (
-    BODY_PLAY,
-    BODY_SHARE,
-    misfit,
-    propose,
-    windows_from_edges,
-    worth,
-)
-from tracker.in_car.yaw import FLOW_NOISE, HEIGHT, EgoMotion
+from tracker.in_car.relief import Relief, make_relief
+from tracker.in_car.yaw import EgoMotion
 from tracker.types import Status
 
 Floats = NDArray[np.float64]
 
-# Log odds at which a vehicle is confirmed, and below which it is given up.
+# Log odds of a vehicle at which it is confirmed, and below which it is given up.
 CONFIRM, REJECT = 2.5, -1.5
 # Bounds of the log odds: old evidence must not outlast new evidence for too long.
 LOWEST, HIGHEST = -6.0, 5.0
-# How much more a window must be worth than a vehicle's box to replace it.
-BETTER = 1.3
-# Least worth of a window that is begun (`tracker.in_car.proposals`).
-LEAST = 0.3
-# The nearest vehicle that is begun is this many times nearer than the farthest.
-NEAREST_SHARE = 12.0
-# Clearness of the outline below which a vehicle is not confirmed, and below which it is given up.
-SHOWN, LOST = 0.45, 0.3
-# The picture is searched for new outlines once in so many frames.
+# Log odds of a single outline: at which a vehicle is begun; which neither raise nor lower a vehicle's; and
+# what one look may add or take.
+BEGIN, EVEN, MOST = 1.5, 0.0, 4.0
+# Outlines are looked at once in so many frames.
 SEARCH = 3
+# Play of an outline's sides and foot around where they are expected, as a share of the width, and of the
+# logarithm of the width in metres.
+PLAY, SIZE_PLAY = 0.06, 0.12
+# Log odds by which another outline over a vehicle has to be better, for this many looks, to replace it.
+BETTER, LOOKS = 2.0, 2
+# Overlap, over the smaller box, at which two boxes cannot both be vehicles; and at which none is begun.
+SAME, TAKEN = 0.55, 0.35
 # Seconds over which the points' evidence is worth once itself: the span of the displacements.
 CORRELATION = 0.35
+# Log odds from which a point may belong to a vehicle, and from which it may while the ego stands.
+LIKELY, UNCLEAR = 1.0, -0.5
+# Ego speed below which a look tells less and less that the last one did not, m/s.
+WALK = 5.0
 
 
 @dataclass(slots=True, kw_only=True)
 class Vehicle:
-    """One tracked vehicle; working px, seconds."""
+    """One tracked vehicle; working px, frames.
+
+    Attributes:
+        id: >= 1.
+        box: (4,).
+        log_width: ln of its width over the contact's height below the horizon: constant as its metres.
+        velocity: (2,) of its middle, px a frame.
+        growth: Share of its size a frame.
+        odds: Log odds that it is one.
+        age: Frames.
+        missed: Frames since a point or an outline showed it.
+        members: Points that move with it.
+        confirmed: Whether it ever was sure.
+        rivals: Looks in a row at which another outline was better.
+    """
 
     id: int
     box: Floats
+    log_width: float
     velocity: Floats = field(default_factory=lambda: np.zeros(2))
     growth: float = 0.0
     odds: float = 0.0
@@ -57,11 +72,7 @@ class Vehicle:
     missed: int = 0
     members: int = 0
     confirmed: bool = False
-    clear: float = 0.0
-    log_width: float = float(np.log(REAR))
-    rate_of_scale: float = 0.0
-    better: int = 0
-    rate_error: float = 10.0
+    rivals: int = 0
 
     @property
     def status(self) -> Status:
@@ -71,8 +82,28 @@ class Vehicle:
         return Status.COASTING if self.missed > 0 else Status.CONFIRMED
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sighting:
+    """The K outlines that a look weighed.
+
+    Attributes:
+        boxes: (K, 4) working px.
+        cues: (K, C), see `tracker.in_car.cues`.
+        odds: (K,) log odds that each is a vehicle's.
+    """
+
+    boxes: Floats
+    cues: Floats
+    odds: Floats
+
+
 class VehicleStore:
-    """Keeps the vehicles of an episode."""
+    """Keeps the vehicles of an episode.
+
+    Attributes:
+        vehicles: In the order of their ids.
+        sighting: What was seen in this frame; None where it was not looked for.
+    """
 
     def __init__(self, *, rate: float) -> None:
         """Start without vehicles."""
@@ -80,16 +111,10 @@ class VehicleStore:
         self._next_id = 1
         self._frame = 0
         self.vehicles: list[Vehicle] = []
+        self.sighting: Sighting | None = None
 
     def step(
-        self,
-        grey: NDArray[np.uint8],
-        points: PointStore,
-        moved: Floats,
-        ratios: Floats,
-        trust: Floats,
-        ego: EgoMotion,
-        farthest: float,
+        self, grey: NDArray[np.uint8], points: PointStore, moved: Floats, ego: EgoMotion, farthest: float
     ) -> None:
         """Advance by one frame.
 
@@ -97,22 +122,114 @@ class VehicleStore:
             grey: (h, w).
             points: Followed into this frame; their owners are updated.
             moved: (N, 2) displacement of each point over `CORRELATION` seconds, px.
-            ratios: (N,) log likelihood ratio of each point's motion.
-            trust: (N,) in [0, 1], how far the picture fixes it.
             ego: The camera's own motion.
             farthest: Least height of the horizon above a contact row, px: beyond that no vehicle is begun.
         """
         horizon = float(ego.focus[1])
-        relief = make_relief(grey, horizon=horizon, middle=float(ego.focus[0]), focal=ego.focal)
         for vehicle in self.vehicles:
             self._carry(vehicle, points, moved)
-            self._weigh(vehicle, points, ratios, trust, ego)
-            self._hold(vehicle, relief, points)
+        self.sighting = None
+        if self._frame % SEARCH == 0:
+            relief = make_relief(grey, horizon=horizon, middle=float(ego.focus[0]), focal=ego.focal)
+            self._look(relief, points, moved, ego.speed, farthest)
+        self._frame += 1
         self._end(grey, points, horizon)
         self._join(points, ego.speed)
-        self._frame += 1
-        if self._frame % SEARCH == 0:
-            self._begin(relief, points, moved, farthest)
+
+    def _look(self, relief: Relief, points: PointStore, moved: Floats, speed: float, farthest: float) -> None:
+        """Weigh the picture's outlines; hold the vehicles to them and begin new ones."""
+        ripe = points.age >= 4
+        # While the ego stands nothing moves, and what did not move against a vehicle may be one.
+        least = LIKELY if speed > WALK else UNCLEAR
+        likely = ripe & (points.evidence > least) & (points.position[:, 1] > relief.horizon + 2.0)
+        shape = len(relief.sums) - 1, relief.sums.shape[1] - 1
+        expected = np.array([_outline(vehicle.box, *shape) for vehicle in self.vehicles]).reshape(-1, 3)
+        expected[:, 2] = np.maximum(expected[:, 2], relief.horizon + 4.0)
+        found = expected
+        if likely.any():
+            found = np.concatenate([expected, outlines(relief, points.position[likely], farthest)])
+        if not len(found):
+            return
+        seen = points.position[ripe], moved[ripe], points.evidence[ripe]
+        measured, windows = cues(relief, found, *seen)
+        odds = log_odds(measured)
+        self.sighting = Sighting(boxes=windows, cues=measured, odds=odds)
+        # Of the two roofs the likelier.
+        count = len(found)
+        tall = odds[count:] > odds[:count]
+        odds = np.where(tall, odds[count:], odds[:count])
+        windows = np.where(tall[:, None], windows[count:], windows[:count])
+        for index, vehicle in enumerate(self.vehicles):
+            self._hold(vehicle, expected[index], windows, odds, index, relief, speed)
+        first = len(self.vehicles)
+        for index in first + np.argsort(-odds[first:], kind="stable"):
+            if odds[index] < BEGIN:
+                break
+            self._begin(windows[index], points, ripe & (points.owner == 0), relief.horizon)
+
+    def _hold(
+        self,
+        vehicle: Vehicle,
+        expected: Floats,
+        windows: Floats,
+        odds: Floats,
+        own: int,
+        relief: Relief,
+        speed: float,
+    ) -> None:
+        """Pull a vehicle's box to the likeliest outline near it, and weigh it by that."""
+        x0, x1, row = expected
+        wide = max(x1 - x0, 1.0)
+        play = PLAY * wide + 1.0
+        widths = np.log((windows[:, 2] - windows[:, 0]) / np.maximum(windows[:, 3] - relief.horizon, 1.0))
+        cut = x0 < 3.0 or x1 > relief.sums.shape[1] - 4.0
+        off = ((windows[:, 0] - x0) / play) ** 2 + ((windows[:, 2] - x1) / play) ** 2
+        off += ((windows[:, 3] - row) / play) ** 2
+        if not cut:
+            off += ((widths - vehicle.log_width) / SIZE_PLAY) ** 2
+        off[own] = 0.0
+        value = odds - 0.5 * off
+        best = int(value.argmax())
+        gain = float(np.clip(odds[best] - EVEN, -MOST, MOST)) * SEARCH / (self._rate * CORRELATION)
+        if gain < 0.0:
+            # While the ego stands nothing moves that could show it.
+            gain *= min(1.0, speed / WALK)
+        vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
+        if vehicle.odds > CONFIRM and vehicle.age >= 0.2 * self._rate and vehicle.members >= 2:
+            vehicle.confirmed = True
+        if odds[best] > 0.0:
+            vehicle.missed = 0
+        young = vehicle.age < 0.5 * self._rate
+        gain = 0.6 if young else 0.35
+        found = windows[best]
+        step = gain * (found - vehicle.box)
+        height, width = len(relief.sums) - 1, relief.sums.shape[1] - 1
+        # Where the frame cuts it off its end is not seen.
+        if found[0] < 1.0 and vehicle.box[0] < 3.0:
+            step[0] = 0.0
+        if found[2] > width - 1.0 and vehicle.box[2] > width - 3.0:
+            step[2] = 0.0
+        if found[3] > height - 3.0:
+            step[3] = 0.0
+        vehicle.box = vehicle.box + step
+        if not cut:
+            vehicle.log_width += (0.4 if young else 0.1) * (widths[best] - vehicle.log_width)
+        self._replace(vehicle, windows, odds, odds[best], relief.horizon)
+
+    def _replace(self, vehicle: Vehicle, windows: Floats, odds: Floats, held: float, horizon: float) -> None:
+        """Move a vehicle to another outline over it that is better by far, again and again."""
+        better = np.flatnonzero(odds > max(held + BETTER, BEGIN))
+        others = [one.box for one in self.vehicles if one is not vehicle and one.confirmed]
+        for index in better[np.argsort(-odds[better], kind="stable")][:20]:
+            window = windows[index]
+            if covered(window, vehicle.box) < SAME or any(covered(window, box) > TAKEN for box in others):
+                continue
+            vehicle.rivals += 1
+            if vehicle.rivals >= LOOKS:
+                vehicle.box, vehicle.rivals = window.copy(), 0
+                vehicle.log_width = float(np.log((window[2] - window[0]) / (window[3] - horizon)))
+            return
+        vehicle.rivals = 0
 
     def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats) -> None:
         """Move the box with its points."""
@@ -141,7 +258,6 @@ class VehicleStore:
                 centred = away - away.mean(0)
                 power = float((centred * centred).sum())
                 scale = float((centred * (flow - flow.mean(0))).sum()) / max(power, 30.0)
-                self._measure_scale(vehicle, scale, power)
                 trust = power / (power + 2000.0)
                 vehicle.growth += 0.3 * trust * (float(np.clip(scale, -0.05, 0.05)) - vehicle.growth)
             middle_shift = shift - vehicle.growth * np.median(away, axis=0)
@@ -155,113 +271,12 @@ class VehicleStore:
         half = 0.5 * np.array([box[2] - box[0], box[3] - box[1]]) * (1.0 + vehicle.growth)
         vehicle.box = np.concatenate([middle - half, middle + half])
 
-    def _measure_scale(self, vehicle: Vehicle, scale: float, power: float) -> None:
-        """Average the rate at which the points of a vehicle move apart, 1/s (scale divergence)."""
-        gain = max(1.0 / (self._rate * 0.6), 1.0 / (vehicle.age + 1.0))
-        vehicle.rate_of_scale += gain * (
-            float(np.clip(scale, -0.1, 0.1)) * self._rate - vehicle.rate_of_scale
-        )
-        noise = 1.5 * FLOW_NOISE * self._rate / np.sqrt(max(power, 30.0))
-        vehicle.rate_error = float(noise * np.sqrt(gain))
-
-    def _divergence(self, vehicle: Vehicle, contact: float, ego: EgoMotion) -> float:
-        """Return the log likelihood ratio of a vehicle's growth.
-
-        What is static grows by g times its height of horizon.
-        """
-        least = ego.ground * contact
-        if vehicle.members < 3 or vehicle.age < 0.3 * self._rate:
-            return 0.0
-        depth = ego.focal * HEIGHT / max(contact, 3.0)
-        own = np.hypot(vehicle.rate_error, (CLOSING + CLOSING_SHARE * ego.speed) / depth)
-        other = np.hypot(vehicle.rate_error, 0.2 * least + 0.02)
-        as_vehicle = -0.5 * (vehicle.rate_of_scale / own) ** 2 - np.log(own)
-        as_static = -0.5 * (min(vehicle.rate_of_scale - least, 0.0) / other) ** 2 - np.log(other)
-        return float(np.clip(as_vehicle - as_static, -2.0, 2.0))
-
-    def _weigh(
-        self, vehicle: Vehicle, points: PointStore, ratios: Floats, trust: Floats, ego: EgoMotion
-    ) -> None:
-        """Add this frame's evidence, once per correlation time."""
-        own = (points.owner == vehicle.id) & (points.age >= 4)
-        worth = float(trust[own].sum())
-        if worth > 0.3:
-            mean = float((np.clip(ratios[own], -4.0, 4.0) * trust[own]).sum()) / worth
-            gain = float(np.clip(mean, -2.0, 2.0)) * min(worth / 2.0, 1.0) / (self._rate * CORRELATION)
-        else:
-            # Nothing speaks for it any more: while the ego moves, old evidence fades.
-            gain = -vehicle.odds * min(ego.speed / 10.0, 1.0) / (2.0 * self._rate)
-        gain += (
-            0.7
-            * self._divergence(vehicle, float(vehicle.box[3] - ego.focus[1]), ego)
-            / (self._rate * CORRELATION)
-        )
-        # Within a clear outline it matters little where the points lie and what moves alike around it.
-        doubt = self._ill_filled(vehicle, points) + self._alike(vehicle, points)
-        gain -= doubt / (self._rate * CORRELATION)
-        gain += float(np.clip(2.0 * (vehicle.clear - 0.4), -1.0, 0.0)) / (self._rate * CORRELATION)
-        vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
-        if (
-            vehicle.odds > CONFIRM
-            and vehicle.clear > SHOWN
-            and vehicle.age >= 0.2 * self._rate
-            and vehicle.members >= 2
-        ):
-            vehicle.confirmed = True
-
-    def _ill_filled(self, vehicle: Vehicle, points: PointStore) -> float:
-        """Return how badly the vehicle's points fill its box, [0, 2].
-
-        A box that drifted off is to be found anew.
-        """
-        own = points.position[points.owner == vehicle.id]
-        if len(own) < 3:
-            return 0.0
-        box = vehicle.box
-        sums = own.sum(0)
-        squares = (own * own).sum(0)
-        cost = misfit(float(len(own)), *sums, *squares, box[0], box[3], box[2] - box[0])
-        return float(np.clip(0.5 * (cost - 4.0), 0.0, 3.0))
-
-    def _alike(self, vehicle: Vehicle, points: PointStore) -> float:
-        """Return how much the surroundings move like the vehicle itself, [0, 2].
-
-        Then it is a piece of them.
-        """
-        box = vehicle.box
-        wide, tall = box[2] - box[0], box[3] - box[1]
-        x, y = points.position.T
-        ring = (x > box[0] - 0.6 * wide) & (x < box[2] + 0.6 * wide)
-        ring &= (y > box[1] + 0.3 * tall) & (y < box[3] + 0.3 * tall)
-        ring &= (points.owner == 0) & (points.age >= 6)
-        like = int((ring & (points.evidence > 1.0)).sum())
-        unlike = int((ring & (points.evidence < -0.5)).sum())
-        return 2.0 * max(like - unlike - 1, 0) / (like + unlike + vehicle.members + 1.0)
-
-    def _hold(self, vehicle: Vehicle, relief: Relief, points: PointStore) -> None:
-        """Pull the box to the edges of the picture."""
-        box = vehicle.box
-        contact = box[3] - relief.horizon
-        if contact < 3.0:
-            return
-        body = _body(points.position[points.owner == vehicle.id], box)
-        young = vehicle.age < 0.5 * self._rate
-        found = refine(relief, box, loose=0.08 if young else 0.05, body=body, log_width=vehicle.log_width)
-        wide, contact = found[2] - found[0], found[3] - relief.horizon
-        shown = clear(relief, found)
-        vehicle.clear += 0.1 * (shown - vehicle.clear)
-        if contact <= 2.0 or not SLIMMEST * contact < wide < WIDEST * contact:
-            return
-        # A vehicle keeps its width in metres, which its width over the height of the horizon is.
-        vehicle.log_width += (0.2 if young else 0.04) * (np.log(wide / contact) - vehicle.log_width)
-        gain = (0.3 if young else 0.15) * min(shown, 1.0)
-        vehicle.box = box + gain * (found - box)
-
     def _end(self, grey: NDArray[np.uint8], points: PointStore, horizon: float) -> None:
+        """Give up vehicles that left, were lost, never proved themselves, or are another's part."""
         height, width = grey.shape
         patience = 0.5 * self._rate
         kept: list[Vehicle] = []
-        for vehicle in sorted(self.vehicles, key=lambda one: (not one.confirmed, -one.clear)):
+        for vehicle in sorted(self.vehicles, key=lambda one: (not one.confirmed, -one.odds, one.id)):
             box = vehicle.box
             wide, tall = box[2] - box[0], box[3] - box[1]
             seen = max(min(box[2], width) - max(box[0], 0.0), 0.0) * max(
@@ -269,13 +284,12 @@ class VehicleStore:
             )
             gone = (
                 vehicle.odds < REJECT
-                or (vehicle.clear < LOST and vehicle.age > 0.3 * self._rate)
                 or vehicle.missed > (patience if vehicle.confirmed else 3)
                 or seen < 0.25 * wide * tall
                 or tall < 6.0
                 or box[3] < horizon + 4.0
                 or (not vehicle.confirmed and vehicle.age > 2.0 * self._rate and vehicle.odds < 0.5)
-                or any(_covered(box, other.box) > 0.55 for other in kept)
+                or any(covered(box, other.box) > SAME for other in kept)
             )
             if gone:
                 points.owner[points.owner == vehicle.id] = 0
@@ -302,82 +316,32 @@ class VehicleStore:
             fresh &= (points.evidence > 0.3) | (moving < 2.0)
             points.owner[fresh] = vehicle.id
 
-    def _begin(self, relief: Relief, points: PointStore, moved: Floats, farthest: float) -> None:
-        """Begin vehicles where unowned points move like one within a clear outline; replace bad outlines."""
-        ripe = points.age >= 4
-        likely = ripe & (points.evidence > 1.0) & (points.position[:, 1] > relief.horizon + 2.0)
-        if likely.sum() < 2:
+    def _begin(self, box: Floats, points: PointStore, free: NDArray[np.bool_], horizon: float) -> None:
+        """Begin a vehicle in an outline (4,) that no other one holds and that has points of its own."""
+        if any(covered(box, other.box) > TAKEN for other in self.vehicles):
             return
-        position = points.position
-        windows, shown = windows_from_edges(relief, position[likely], NEAREST_SHARE * farthest, farthest)
-        known = ripe & (np.abs(points.evidence) > 0.8)
-        seen = position[known], moved[known], points.evidence[known]
-        for window, value in zip(
-            *propose(windows, shown, *seen, relief.horizon, least=LEAST, most=12), strict=True
-        ):
-            inside = _inside(position, window, 0.05) & (points.evidence > 0.5)
-            window[1] = roof_row(relief, window[0], window[2], window[3], _body(position[inside], window)[1])
-            shared = [_covered(window, one.box) for one in self.vehicles]
-            if not shared or max(shared) < 0.3:
-                self._try(window, clear(relief, window), points, ripe & (points.owner == 0), relief.horizon)
-                continue
-            # A better outline of a vehicle that is tracked already.
-            rival = self.vehicles[int(np.argmax(shared))]
-            if value > BETTER * max(worth(rival.box, relief, *seen), 0.0):
-                rival.better += 1
-                if rival.better >= 2:
-                    rival.box, rival.better = window.copy(), 0
-                    rival.log_width = float(np.log((window[2] - window[0]) / (window[3] - relief.horizon)))
-            else:
-                rival.better = 0
-
-    def _try(
-        self, box: Floats, shown: float, points: PointStore, free: NDArray[np.bool_], horizon: float
-    ) -> None:
-        if any(_covered(box, other.box) > 0.35 for other in self.vehicles):
+        wide, tall = box[2] - box[0], box[3] - box[1]
+        x, y = points.position.T
+        members = free & (points.evidence > 0.5)
+        members &= (x > box[0] - 0.05 * wide) & (x < box[2] + 0.05 * wide)
+        members &= (y > box[1] - 0.05 * tall) & (y < box[3] + 0.05 * tall)
+        if members.sum() < 1:
             return
-        members = _inside(points.position, box, 0.05) & free
-        good = members & (points.evidence > 0.5)
-        if good.sum() < 2 or (members & (points.evidence < -0.8)).sum() > 0.5 * good.sum():
-            return
-        vehicle = Vehicle(
-            id=self._next_id,
-            box=box,
-            clear=shown,
-            log_width=float(np.log((box[2] - box[0]) / (box[3] - horizon))),
-        )
+        log_width = float(np.log(wide / (box[3] - horizon)))
+        vehicle = Vehicle(id=self._next_id, box=box.copy(), log_width=log_width)
         self._next_id += 1
-        vehicle.velocity = np.median(points.flow[good], axis=0)
-        vehicle.members = int(good.sum())
-        points.owner[good] = vehicle.id
+        vehicle.velocity = np.median(points.flow[members], axis=0)
+        vehicle.members = int(members.sum())
+        points.owner[members] = vehicle.id
         self.vehicles.append(vehicle)
 
 
-def _body(position: Floats, box: Floats) -> Floats:
-    """Return the box of a vehicle's points (N, 2).
-
-    Or what is most likely of its own where they are too few.
-    """
-    if len(position) >= 3:
-        inner: Floats = np.quantile(position, (0.1, 0.9), axis=0)
-        return np.asarray(inner.reshape(-1), np.float64)
-    wide = box[2] - box[0]
-    return np.asarray(box + np.array([0.1, 0.15, -0.1, -0.15]) * wide)
+def _outline(box: Floats, height: int, width: int) -> tuple[float, float, float]:
+    """Return what of a box's sides and foot lies in the picture: x0, x1, row."""
+    return max(float(box[0]), 0.0), min(float(box[2]), float(width)), min(float(box[3]), height - 1.0)
 
 
-def _inside(position: Floats, box: Floats, play: float) -> NDArray[np.bool_]:
-    wide, tall = box[2] - box[0], box[3] - box[1]
-    x, y = position.T
-    result: NDArray[np.bool_] = (
-        (x > box[0] - play * wide)
-        & (x < box[2] + play * wide)
-        & (y > box[1] - play * tall)
-        & (y < box[3] + play * tall)
-    )
-    return result
-
-
-def _covered(box: Floats, other: Floats) -> float:
+def covered(box: Floats, other: Floats) -> float:
     """Return the shared area over the smaller box's area."""
     wide = min(box[2], other[2]) - max(box[0], other[0])
     tall = min(box[3], other[3]) - max(box[1], other[1])

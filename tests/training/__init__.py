@@ -1,0 +1,1 @@
+"""What the trackers learnt from simulated drives, and how."""
