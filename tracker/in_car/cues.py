@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from tracker.in_car.outlines import FRAME_SIDE, REAR, foot, rear_edges, roof, side
 from tracker.in_car.relief import ACROSS, BRIGHT, DOWN, Relief, mean
-from tracker.in_car.yaw import HEIGHT
 
 Floats = NDArray[np.float64]
 
@@ -30,8 +29,8 @@ class Cue(IntEnum):
     """ln of the rear's width over a usual one, 0 where the frame cuts it off."""
     CUT_WIDTH = 1
     """The same where the frame cuts it off, else 0."""
-    DISTANCE = 2
-    """ln of the distance, metres at the usual height of the camera."""
+    NEARNESS = 2
+    """ln of the horizon's height above the contact row, px."""
     FRAME = 3
     """Vertical edge on the weaker side, from the contact row up to the roof."""
     TALLNESS = 4
@@ -112,7 +111,7 @@ def _look(sums, outline, scene, row_out):  # type: ignore[no-untyped-def]
     a, b = rear_edges(x0, x1, contact, middle, focal)
     size = math.log(max((b - a) / usual, 0.05))
     row_out[Cue.CUT_WIDTH if cut_left or cut_right else Cue.WIDTH] = size
-    row_out[Cue.DISTANCE] = math.log(focal * HEIGHT / contact)
+    row_out[Cue.NEARNESS] = math.log(contact)
 
     level = mean(sums, ACROSS, int(x0 - 0.5 * wide), top, int(x1 + 0.5 * wide), bottom) + 2.0
     sides, pillars, contrasts = np.full(2, FRAME_SIDE), np.full(2, FRAME_SIDE), np.full(2, FRAME_SIDE)

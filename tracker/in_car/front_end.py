@@ -11,9 +11,8 @@ from tracker.in_car.features import Features, Picture, find_features, working_pi
 from tracker.in_car.traces import TraceSet, TraceStore
 from tracker.types import Frame, Info
 
-# Where the focal length is not given: a horizontal field of view of about 44 degrees, common among dash
-# cameras.
-FOCAL_PER_WIDTH = 1.25
+# Where the focal length is not given: a horizontal field of view of 55 degrees, common among dash cameras.
+FOCAL_PER_WIDTH = 0.95
 MIN_HITS = 4
 
 

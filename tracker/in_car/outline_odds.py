@@ -1,69 +1,64 @@
-"""The log odds that an outline is a vehicle's that goes the ego's way: a table for each cue, their sum.
+"""The log odds that an outline is a vehicle's that goes the ego's way: boosted trees over its cues.
 
-The tables (outline_odds.json) were learnt from simulated drives by ``python -m tests.training.outlines``.
-Each says by how much a value of its cue raises or lowers the odds.
+The trees (outline_odds.npz) were learnt from simulated drives by ``python -m tests.training.outlines``.
 """
 
 from __future__ import annotations
 
-import json
 from functools import cache
-from importlib.resources import files
+from importlib.resources import as_file, files
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.in_car.cues import Cue
-
 Floats = NDArray[np.float64]
 
+# After so many trees an outline with odds below HOPELESS is given up: the others could not save it.
+FIRST, HOPELESS = 40, -4.0
 
-class Tables(NamedTuple):
-    """What each cue is worth.
+
+class Trees(NamedTuple):
+    """T trees, their nodes one after the other; a node's left child follows it.
 
     Attributes:
-        edges: (C, B - 1) between the B bins of each of the C cues, ascending, infinite where there are fewer.
-        odds: (C, B) log odds that a value in the bin adds.
-        bias: Log odds of an outline whose cues say nothing.
+        roots: (T,) int32, where each tree begins.
+        cues: (M,) int16, the cue that a node asks for, -1 in a leaf.
+        limits: (M,) float32: up to here it goes left; in a leaf the log odds that it adds.
+        rights: (M,) int32, the right child.
     """
 
-    edges: Floats
-    odds: Floats
-    bias: float
+    roots: NDArray[np.int32]
+    cues: NDArray[np.int16]
+    limits: NDArray[np.float32]
+    rights: NDArray[np.int32]
 
 
 @cache
-def tables() -> Tables:
-    """Read the tables."""
-    document = json.loads(files("tracker.in_car").joinpath("outline_odds.json").read_text())
-    rows = [document["cues"][cue.name.lower()] for cue in Cue]
-    bins = max(len(row["odds"]) for row in rows)
-    edges, odds = np.full((len(Cue), bins - 1), np.inf), np.zeros((len(Cue), bins))
-    for k, row in enumerate(rows):
-        edges[k, : len(row["edges"])] = row["edges"]
-        odds[k, : len(row["odds"])] = row["odds"]
-    return Tables(edges=edges, odds=odds, bias=float(document["bias"]))
+def trees() -> Trees:
+    """Read the trees."""
+    with as_file(files("tracker.in_car") / "outline_odds.npz") as path, np.load(path) as stored:
+        return Trees(**{name: stored[name] for name in Trees._fields})
 
 
 @njit(cache=True)
-def _sum(found, edges, odds, bias):  # type: ignore[no-untyped-def]
-    result = np.full(found.shape[0], bias)
+def _sum(found, roots, cues, limits, rights):  # type: ignore[no-untyped-def]
+    result = np.zeros(found.shape[0])
     for i in range(found.shape[0]):
-        for k in range(edges.shape[0]):
-            low, high = 0, edges.shape[1]
-            while low < high:
-                middle = (low + high) // 2
-                if edges[k, middle] <= found[i, k]:
-                    low = middle + 1
-                else:
-                    high = middle
-            result[i] += odds[k, low]
+        total = 0.0
+        for k in range(roots.size):
+            if k == FIRST and total < HOPELESS:
+                break
+            node = roots[k]
+            while cues[node] >= 0:
+                node = node + 1 if found[i, cues[node]] <= limits[node] else rights[node]
+            total += limits[node]
+        result[i] = total
     return result
 
 
 def log_odds(found: Floats) -> Floats:
     """Return the log odds (K,) of outlines with the cues (K, C)."""
-    result: Floats = _sum(found, *tables())
+    result: Floats = _sum(found.astype(np.float32), *trees())
     return result

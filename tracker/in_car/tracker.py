@@ -20,13 +20,14 @@ from tracker.in_car.front_end import FrontEnd
 from tracker.in_car.points import PointStore
 from tracker.in_car.traces import TraceSet
 from tracker.in_car.vehicles import CORRELATION, Sighting, VehicleStore
-from tracker.in_car.yaw import HEIGHT, EgoMotion
+from tracker.in_car.yaw import EgoMotion
 from tracker.types import Diagnostics, Frame, Info, Label, Status, Traces, Tracks
 
 Floats = NDArray[np.float64]
 
-# Greatest distance at which a vehicle is begun, metres.
-REACH = 75.0
+# Least height of the horizon above a vehicle's contact row, as a share of the picture's width: farther
+# ones are too small to be told from anything else.
+FARTHEST = 0.0165
 # Rows below the horizon, as a share of the width, from which on a point that stands still in the picture is
 # no vehicle's.
 NEAR_ROWS = 0.11
@@ -104,7 +105,7 @@ class InCarTracker:
             points,
             moved * (CORRELATION / np.maximum(seconds, 1e-3))[:, None],
             ego,
-            focal * HEIGHT / REACH,
+            FARTHEST * grey.shape[1],
         )
         traces = self._front.trace(float(ego.shift[1]))
         tracks = self._tracks(scale)

@@ -26,7 +26,7 @@ CONFIRM, REJECT = 2.5, -1.5
 LOWEST, HIGHEST = -6.0, 5.0
 # Log odds of a single outline: at which a vehicle is begun; which neither raise nor lower a vehicle's; and
 # what one look may add or take.
-BEGIN, EVEN, MOST = 1.5, 0.0, 4.0
+BEGIN, EVEN, MOST = 0.5, -1.0, 4.0
 # Outlines are looked at once in so many frames.
 SEARCH = 3
 # Play of an outline's sides and foot around where they are expected, as a share of the width, and of the

@@ -26,6 +26,9 @@ HEIGHT = 1.25
 LOG_STEP, SLOWEST, FASTEST = 0.04, 0.7, 90.0
 # Usual speed, m/s, and the log spread of speed without an odometer, of the camera's height with one.
 USUAL_SPEED, SPEED_SPREAD, HEIGHT_SPREAD = 20.0, 1.0, 0.4
+# Standard deviation of the rotation that is left over after a frame's estimate, px, and seconds for which the
+# focus of expansion is remembered.
+LEFT_OVER, FOCUS_MEMORY = 3.0, 5.0
 # Seconds for which the histogram of the ground's expansion remembers, without and with an odometer.
 MEMORY, LONG_MEMORY = 0.7, 4.0
 
@@ -67,44 +70,47 @@ def _rotation(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _lines(position, moved, weight, focus):  # type: ignore[no-untyped-def]
-    """Gather the lines along the points' flows, which pass through the focus of expansion.
+def _epipolar(position, moved, weight, focus, focal):  # type: ignore[no-untyped-def]
+    """Gather normal equations for a rotation that is left over and for a shift of the focus of expansion.
+
+    Both turn the flow of a static point away from the focus. A near point tells of the shift, a far one,
+    which hardly moves otherwise, of the rotation: only together do they tell the two apart.
 
     Args:
         position: (N, 2) now.
-        moved: (N, 2) displacement without rotation.
+        moved: (N, 2) displacement, rotation removed as far as it is known.
         weight: (N,) 0 for points that are left out.
-        focus: (2,) as far as it is known: lines that miss it by much count little.
+        focus: (2,) as far as it is known.
+        focal: Px.
 
     Returns:
-        Normal equations for the focus, (2, 2) and (2,): information and its product with the focus; and the
-        number of points in them.
+        (4, 4) and (4,): for the rotation's shifts a and b of the picture's middle (see `_rotation`), px, and
+        the shift of the focus along x and y, px.
     """
-    information, vector = np.zeros((2, 2)), np.zeros(2)
-    used = 0
+    matrix, vector = np.zeros((4, 4)), np.zeros(4)
+    coefficient = np.empty(4)
+    noise = 2.0 * FLOW_NOISE
     for i in range(weight.size):
-        u, v = moved[i, 0], moved[i, 1]
-        size = np.hypot(u, v)
-        if weight[i] <= 0.0 or size <= 1.5:
+        if weight[i] <= 0.0:
             continue
-        used += 1
-        x, y = position[i, 0] - 0.5 * u, position[i, 1] - 0.5 * v
-        # n . focus = n . p, n the flow's normal.
-        across, down = -v / size, u / size
-        offset = across * x + down * y
-        distance = max(np.hypot(x - focus[0], y - focus[1]), 5.0)
-        # Angular noise of the flow, carried to the focus.
-        sigma = 1.0 + distance * 2.0 * FLOW_NOISE / size
-        residual = offset - across * focus[0] - down * focus[1]
+        u, v = moved[i, 0], moved[i, 1]
+        x, y = position[i, 0] - 0.5 * u - focus[0], position[i, 1] - 0.5 * v - focus[1]
+        r = np.sqrt(x * x + y * y)
+        if r < 8.0:
+            continue
+        mixed = x * y / (focal * focal)
+        coefficient[0] = ((1.0 + x * x / (focal * focal)) * y - mixed * x) / r
+        coefficient[1] = ((1.0 + y * y / (focal * focal)) * x - mixed * y) / r
+        coefficient[2] = v / r
+        coefficient[3] = -u / r
+        residual = (u * y - v * x) / r
         # Neighbouring points and frames share their errors: they count a fraction each.
-        strength = 0.08 * weight[i] / sigma**2 / (1.0 + (residual / (2.0 * sigma)) ** 2)
-        information[0, 0] += strength * across * across
-        information[0, 1] += strength * across * down
-        information[1, 1] += strength * down * down
-        vector[0] += strength * offset * across
-        vector[1] += strength * offset * down
-    information[1, 0] = information[0, 1]
-    return information, vector, used
+        w = 0.08 * weight[i] / (noise * noise) / (1.0 + (residual / (2.0 * noise)) ** 2)
+        for j in range(4):
+            vector[j] -= w * coefficient[j] * residual
+            for k in range(4):
+                matrix[j, k] += w * coefficient[j] * coefficient[k]
+    return matrix, vector
 
 
 @njit(cache=True)
@@ -225,12 +231,17 @@ class EgoMotion:
         self._learn_ground(position, moved, seconds, weight, speed)
 
     def _learn_focus(self, position: Floats, moved: Floats, weight: Floats) -> None:
-        information, vector, used = _lines(position, moved, weight, self.focus)
-        if used < 6:
-            return
-        forget = 0.985 ** (30.0 / self._rate)
+        matrix, vector = _epipolar(position, moved, weight, self.focus, self.focal)
+        # What the left-over rotation can explain tells nothing about the focus.
+        turn = matrix[:2, :2] + np.eye(2) / LEFT_OVER**2
+        solved = np.linalg.solve(turn, np.column_stack([matrix[:2, 2:], vector[:2]]))
+        information = matrix[2:, 2:] - matrix[2:, :2] @ solved[:, :2]
+        shift = vector[2:] - matrix[2:, :2] @ solved[:, 2]
+        forget = np.exp(-1.0 / (self._rate * FOCUS_MEMORY))
         self._information = forget * self._information + (1 - forget) * self._prior_information + information
-        self._vector = forget * self._vector + (1 - forget) * self._prior_vector + vector
+        self._vector = (
+            forget * self._vector + (1 - forget) * self._prior_vector + information @ self.focus + shift
+        )
         self.focus = np.linalg.solve(self._information, self._vector)
 
     def _learn_ground(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracker.in_car.evidence import motion_evidence
-from tracker.in_car.yaw import FLOW_NOISE, HEIGHT, EgoMotion, _deposit, _lines
+from tracker.in_car.yaw import FLOW_NOISE, HEIGHT, EgoMotion, _deposit, _epipolar
 
 FOCAL, RATE = 800.0, 30.0
 FOCUS = np.array([330.0, 228.0])
@@ -88,22 +88,51 @@ def test_standing_still_says_nothing_against_a_static_thing():
     assert (np.abs(ratios) < 1.5).all()
 
 
-def test_lines_of_flow_equal_weighted_least_squares():
+def test_epipolar_equations_equal_an_explicit_design_matrix():
     rng = np.random.default_rng(4)
     position, moved = rng.uniform(0, 600, (30, 2)), rng.normal(0, 3, (30, 2))
     weight = rng.choice([0.0, 0.3, 1.0], 30)
-    information, vector, used = _lines(position, moved, weight, FOCUS)
-    size = np.linalg.norm(moved, axis=1)
-    use = (weight > 0) & (size > 1.5)
-    normal = (moved[use] @ np.array([[0.0, 1], [-1, 0]])) / size[use, None]
-    middle = position[use] - moved[use] / 2
-    offset = np.einsum("ij,ij->i", normal, middle)
-    away = np.maximum(np.linalg.norm(middle - FOCUS, axis=1), 5.0)
-    sigma = 1 + 2 * FLOW_NOISE * away / size[use]
-    strength = 0.08 * weight[use] / sigma**2 / (1 + ((offset - normal @ FOCUS) / (2 * sigma)) ** 2)
-    assert used == use.sum()
-    assert np.allclose(information, normal.T @ np.diag(strength) @ normal)
-    assert np.allclose(vector, normal.T @ (strength * offset))
+    matrix, vector = _epipolar(position, moved, weight, FOCUS, FOCAL)
+
+    def residual(a: float, b: float, fx: float, fy: float) -> np.ndarray:
+        """How far the flow of a static point, less a rotation, leaves the line through the focus."""
+        x, y = (position - moved / 2 - FOCUS).T
+        turned_x = -a * (1 + (x / FOCAL) ** 2) + b * x * y / FOCAL**2
+        turned_y = b * (1 + (y / FOCAL) ** 2) - a * x * y / FOCAL**2
+        u, v = moved[:, 0] - turned_x, moved[:, 1] - turned_y
+        return (u * (y - fy) - v * (x - fx)) / np.hypot(x, y)
+
+    step = 1e-5
+    design = np.stack([(residual(*(step * e)) - residual(*(-step * e))) / (2 * step) for e in np.eye(4)], 1)
+    free = residual(0, 0, 0, 0)
+    noise = 2 * FLOW_NOISE
+    w = 0.08 * weight / noise**2 / (1 + (free / (2 * noise)) ** 2)
+    assert np.allclose(matrix, design.T @ (w[:, None] * design), rtol=1e-5)
+    assert np.allclose(vector, -design.T @ (w * free), rtol=1e-5)
+
+
+def test_a_focus_off_the_middle_is_not_taken_for_a_turn():
+    rng = np.random.default_rng(9)
+    rate, speed = 30.0, 15.0
+    true = FOCUS + np.array([15.0, -3.0])
+    ego = EgoMotion(focal=FOCAL, focus=tuple(FOCUS), sure=True, rate=rate)
+    seconds = 10 / rate
+    for _ in range(600):
+        points = np.stack([rng.uniform(-40, 40, 150), rng.uniform(-3, 1.25, 150), rng.uniform(8, 90, 150)], 1)
+        now = true + FOCAL * points[:, :2] / points[:, 2:]
+        seen = (np.abs(now - true) < [320, 240]).all(1)
+        now, points = now[seen], points[seen]
+        one, ten = (
+            now - true - FOCAL * points[:, :2] / (points[:, 2:] + speed * time)
+            for time in (1 / rate, seconds)
+        )
+        weight = np.ones(len(now))
+        turned = ego.rotate(now, one + rng.normal(0, 0.1, one.shape), weight)
+        # Ten frames of the estimated rotation are taken off.
+        left = ten - 10 * turned + rng.normal(0, 0.1, ten.shape)
+        ego.learn(now, left, np.full(len(now), seconds), weight)
+    assert np.abs(ego.focus - true).max() < 3.0
+    assert abs(ego.yaw_rate) < 0.003
 
 
 def test_deposit_adds_gaussians():
