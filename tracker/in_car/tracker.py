@@ -31,6 +31,9 @@ FARTHEST = 0.0165
 # Rows below the horizon, as a share of the width, from which on a point that stands still in the picture is
 # no vehicle's.
 NEAR_ROWS = 0.11
+# Shares of a vehicle's width: a trace so far inside its sides is the vehicle's; so far outside it may be the
+# vehicle's edge or the background next to it.
+INNER, RIM = 0.05, 0.06
 # Frames that a point must have been followed before its motion says anything.
 RIPE = 4
 
@@ -50,7 +53,6 @@ class InCarTracker:
         self._vehicles = VehicleStore(rate=info.rate)
         self._ego: EgoMotion | None = None
         self._odds: dict[int, float] = {}
-        self._sums: dict[int, int] = {}
         self._diagnostics = Diagnostics()
 
     @property
@@ -134,7 +136,8 @@ class InCarTracker:
 
     def _label(self, traces: TraceSet, tracks: Tracks, scale: float) -> None:
         """Decide what each trace is, and fill the diagnostics."""
-        owners = _owners(traces, tracks)
+        owners = _in_boxes(traces, tracks, INNER)
+        rims = _in_boxes(traces, tracks, -RIM)
         near = self._nearby_evidence(traces, scale)
         labels = np.zeros(len(traces), np.uint8)
         chances = np.full(len(traces), 0.5)
@@ -146,6 +149,8 @@ class InCarTracker:
                 gain = 3.0
             elif owner:
                 gain = 0.5 * near[index]
+            elif rims[index] and sure[rims[index]]:
+                gain = near[index]
             else:
                 gain = near[index] - 1.5
             odds = float(np.clip(odds + gain / (self._info.rate * CORRELATION), -5.0, 5.0))
@@ -184,10 +189,13 @@ class InCarTracker:
         return np.asarray((close * evidence[None]).sum(1) / np.maximum(count, 1))
 
 
-def _owners(traces: TraceSet, tracks: Tracks) -> NDArray[np.int64]:
-    """Return (N,) the id of the track in whose box a trace lies, 0 for none.
+def _in_boxes(traces: TraceSet, tracks: Tracks, margin: float) -> NDArray[np.int64]:
+    """Return (N,) the id of the track in whose box a trace lies, 0 for none; of several the nearest.
 
-    Of several the one whose middle is nearest.
+    Args:
+        traces: N of them.
+        tracks: Of the frame.
+        margin: What of a box is left out at each side, as a share of its width; negative adds to it.
     """
     owners = np.zeros(len(traces), np.int64)
     if not len(tracks) or not len(traces):
@@ -195,7 +203,7 @@ def _owners(traces: TraceSet, tracks: Tracks) -> NDArray[np.int64]:
     boxes = tracks.boxes
     wide, tall = boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]
     x, y = traces.x[:, None], traces.y[:, None]
-    inside = (x > boxes[:, 0] + 0.05 * wide) & (x < boxes[:, 2] - 0.05 * wide)
+    inside = (x > boxes[:, 0] + margin * wide) & (x < boxes[:, 2] - margin * wide)
     inside &= (y > boxes[:, 1] - 0.1 * tall) & (y < boxes[:, 3] + 0.08 * tall)
     # A cluster much wider than the vehicle is something behind it.
     inside &= traces.width[:, None] < 1.3 * wide
