@@ -1,0 +1,92 @@
+"""The trees that weigh outlines: well formed, and walked as trees are."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tracker.in_car.cues import COUNT
+from tracker.in_car.outline_odds import FIRST, HOPELESS, Trees, _sum, log_odds, trees
+
+
+def leaf(grown, node, row):
+    """Follow one tree by what its documentation says."""
+    if grown.cues[node] < 0:
+        return float(grown.limits[node])
+    left = row[grown.cues[node]] <= grown.limits[node]
+    return leaf(grown, node + 1 if left else grown.rights[node], row)
+
+
+def walk(grown, row):
+    """Add up the trees one by one; give up where the first ones leave no hope."""
+    total = 0.0
+    for number, root in enumerate(grown.roots):
+        if number == FIRST and total < HOPELESS:
+            return total
+        total += leaf(grown, root, row)
+    return total
+
+
+def grow(rng, count):
+    """Random trees."""
+    roots, cues, limits, rights = [], [], [], []
+
+    def add(depth):
+        place = len(cues)
+        split = depth > 0 and rng.random() < 0.8
+        cues.append(rng.integers(COUNT) if split else -1)
+        limits.append(rng.normal(0.0, 0.5))
+        rights.append(0)
+        if split:
+            add(depth - 1)
+            rights[place] = len(cues)
+            add(depth - 1)
+
+    for _ in range(count):
+        roots.append(len(cues))
+        add(4)
+    return Trees(
+        np.array(roots, np.int32),
+        np.array(cues, np.int16),
+        np.array(limits, np.float32),
+        np.array(rights, np.int32),
+    )
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 2 * FIRST))
+def test_sums_are_those_of_a_walk_through_random_trees(seed, count):
+    rng = np.random.default_rng(seed)
+    grown = grow(rng, count)
+    found = rng.normal(0.0, 1.0, (20, COUNT)).astype(np.float32)
+    np.testing.assert_allclose(_sum(found, *grown), [walk(grown, row) for row in found], atol=1e-9)
+
+
+def test_learnt_trees_are_well_formed():
+    grown = trees()
+    inner = grown.cues >= 0
+    assert len(grown.roots) > FIRST
+    assert grown.roots[0] == 0
+    assert grown.cues.max() < COUNT
+    assert np.isfinite(grown.limits).all()
+    # Every node but the roots is the child of exactly one.
+    children = np.concatenate([np.flatnonzero(inner) + 1, grown.rights[inner]])
+    assert sorted([*children, *grown.roots]) == list(range(len(grown.cues)))
+    assert (grown.rights[inner] > np.flatnonzero(inner) + 1).all()
+
+
+def test_learnt_trees_are_walked_and_given_up():
+    rng = np.random.default_rng(3)
+    grown = trees()
+    # Near the limits that the trees ask for, so that all branches are taken.
+    spread = [np.concatenate([grown.limits[grown.cues == cue], [0.0]]) for cue in range(COUNT)]
+    found = np.stack([rng.choice(limits, 300) for limits in spread], axis=1).astype(float)
+    odds = log_odds(found)
+    np.testing.assert_allclose(odds, [walk(grown, row) for row in found.astype(np.float32)], atol=1e-9)
+    assert (odds < HOPELESS).any()
+    assert (odds > HOPELESS).any()
+
+
+def test_no_outlines_no_odds():
+    assert log_odds(np.empty((0, COUNT))).shape == (0,)
