@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.in_car.outlines import FRAME_SIDE, REAR, foot, rear_edges, roof, side
-from tracker.in_car.relief import ACROSS, BRIGHT, DOWN, Relief, mean
+from tracker.in_car.outlines import FRAME_SIDE, REAR, foot, rear_edges, rear_width, roof, side
+from tracker.in_car.relief import ACROSS, BRIGHT, DOWN, RED, Relief, mean
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Cue(IntEnum):
     FRAME = 3
     """Vertical edge on the weaker side, from the contact row up to the roof."""
     TALLNESS = 4
-    """Height."""
+    """Height over the rear's width."""
     WEAKER_SIDE = 5
     """Vertical edge on the weaker side, lower half."""
     STRONGER_SIDE = 6
@@ -85,6 +85,15 @@ class Cue(IntEnum):
     AGAINST_BESIDE = 35
     AGAINST_BELOW = 36
     FOR_BELOW = 37
+    WEAKER_LAMP = 38
+    """Redness where tail lamps are, on the weaker side, in grey levels."""
+    STRONGER_LAMP = 39
+    RED_BETWEEN = 40
+    """The same between them: a red body is no lamp."""
+    OTHER_ROOF = 41
+    """Horizontal edge at the other roof, a high one for a car's and a low one for a lorry's."""
+    SIDE_ABOVE = 42
+    """Vertical edge on the weaker side over the roof: the body goes on."""
 
 
 # Points' log odds count up to this much; beyond CLEAR a point is called for or against.
@@ -94,6 +103,11 @@ BODY_PLAY, BODY_SHARE = 1.0, 0.02
 # How far around an outline its cut-off parts are looked for: less than the gap between two lanes.
 REACH = 0.3
 COUNT = len(Cue)
+# Tail lamps are looked for in so many bands, each so tall, from a top down: shares of a usual width; and over
+# this share of the rear's width from each side.
+LAMP_BANDS, LAMP_TOP, LAMP_TALL, LAMP_WIDE = 4, 0.75, 0.14, 0.22
+# How far above a roof it is looked whether the body goes on, as a share of the rear's width.
+ABOVE = 0.3
 # Places at which the two halves are compared.
 MIRROR = 12
 
@@ -148,6 +162,16 @@ def _look(sums, outline, scene, row_out):  # type: ignore[no-untyped-def]
     beside += mean(sums, ACROSS, int(x1 + 0.06 * wide), top, int(x1 + 0.4 * wide), bottom)
     row_out[Cue.EDGES_BESIDE] = min(0.5 * beside / level, 3.0)
     row_out[Cue.STEPS_INSIDE] = min(mean(sums, DOWN, inner_left, top, inner_right, bottom) / level, 4.0)
+    lamps, between = np.zeros(2), 0.0
+    for band in range(LAMP_BANDS):
+        first = int(row - (LAMP_TOP - band * LAMP_TALL) * usual)
+        last = max(int(row - (LAMP_TOP - (band + 1) * LAMP_TALL) * usual), first + 1)
+        reach = max(LAMP_WIDE * (b - a), 2.0)
+        lamps[0] = max(lamps[0], mean(sums, RED, int(a), first, int(a + reach), last))
+        lamps[1] = max(lamps[1], mean(sums, RED, int(b - reach), first, int(b), last))
+        between = max(between, mean(sums, RED, int(a + 1.3 * reach), first, int(b - 1.3 * reach), last))
+    row_out[Cue.WEAKER_LAMP], row_out[Cue.STRONGER_LAMP] = lamps.min(), lamps.max()
+    row_out[Cue.RED_BETWEEN] = between
     profile = np.empty(MIRROR)
     for k in range(MIRROR):
         c0, c1 = int(a + k * (b - a) / MIRROR), int(a + (k + 1) * (b - a) / MIRROR) + 1
@@ -157,11 +181,11 @@ def _look(sums, outline, scene, row_out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _weigh(outline, x, y, u, v, evidence, horizon, middle, row_out):  # type: ignore[no-untyped-def]
+def _weigh(outline, rear, x, y, u, v, evidence, horizon, middle, row_out):  # type: ignore[no-untyped-def]
     """Write the cues of the points of one outline; return the row of the highest one for it."""
     x0, x1, row = outline
     wide = x1 - x0
-    play, top = 0.03 * wide + 1.0, row - 1.2 * wide
+    play, top = 0.03 * wide + 1.0, row - 1.2 * rear
     weight, sx, sy, sxx, syy, su, sv, suv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     total, against, count, count_against, core = 0.0, 0.0, 0, 0, 0
     left, right, highest, lowest = 1e9, -1e9, 1e9, -1e9
@@ -173,7 +197,7 @@ def _weigh(outline, x, y, u, v, evidence, horizon, middle, row_out):  # type: ig
         if y[i] < horizon + 2.0:
             value = min(value, 0.5)
         # Over a low vehicle's roof the background is seen.
-        over = y[i] < row - 0.8 * wide
+        over = y[i] < row - 0.8 * rear
         if value > 0.0:
             if value > CLEAR:
                 count += 1
@@ -203,7 +227,7 @@ def _weigh(outline, x, y, u, v, evidence, horizon, middle, row_out):  # type: ig
     if count == 0:
         row_out[Cue.GAP_INNER] = row_out[Cue.GAP_OUTER] = row_out[Cue.GAP_BELOW] = 1.0
         row_out[Cue.GAP_ABOVE] = 1.2
-        return row - 0.5 * wide
+        return row - 0.5 * rear
     mean_u, mean_v = su / weight, sv / weight
     moves = BODY_PLAY + BODY_SHARE * wide
     scatter = max(suv - (su * su + sv * sv) / weight, 0.0) / weight
@@ -212,11 +236,11 @@ def _weigh(outline, x, y, u, v, evidence, horizon, middle, row_out):  # type: ig
     toward_left = 0.5 * (x0 + x1) > middle
     row_out[Cue.GAP_INNER] = gaps[0] if toward_left else gaps[1]
     row_out[Cue.GAP_OUTER] = gaps[1] if toward_left else gaps[0]
-    row_out[Cue.GAP_ABOVE], row_out[Cue.GAP_BELOW] = (highest - top) / wide, (row - lowest) / wide
+    row_out[Cue.GAP_ABOVE], row_out[Cue.GAP_BELOW] = (highest - top) / rear, (row - lowest) / rear
     row_out[Cue.SPREAD_X] = math.sqrt(max(sxx / weight - (sx / weight) ** 2, 0.0)) / wide
-    row_out[Cue.SPREAD_Y] = math.sqrt(max(syy / weight - (sy / weight) ** 2, 0.0)) / wide
+    row_out[Cue.SPREAD_Y] = math.sqrt(max(syy / weight - (sy / weight) ** 2, 0.0)) / rear
     alike, beside, under, under_for = 0.0, 0.0, 0.0, 0.0
-    reach, ceiling = REACH * wide, max(row - 0.8 * wide, horizon + 2.0)
+    reach, ceiling = REACH * wide, max(row - 0.8 * rear, horizon + 2.0)
     for i in range(x.size):
         if x[i] < x0 - reach or x[i] > x1 + reach or y[i] < ceiling or y[i] > row + reach:
             continue
@@ -238,6 +262,17 @@ def _weigh(outline, x, y, u, v, evidence, horizon, middle, row_out):  # type: ig
 
 
 @njit(cache=True)
+def _weaker_side(sums, x0, x1, first, last, level):  # type: ignore[no-untyped-def]
+    """Return the vertical edge over rows [first, last) on the weaker of the sides that the frame shows."""
+    weaker = 4.0
+    if x0 >= 3.0:
+        weaker = min(weaker, side(sums, x0, first, last) / level)
+    if x1 <= sums.shape[1] - 4.0:
+        weaker = min(weaker, side(sums, x1, first, last) / level)
+    return weaker
+
+
+@njit(cache=True)
 def _cues(sums, outlines, x, y, u, v, evidence, scene):  # type: ignore[no-untyped-def]
     width = sums.shape[1] - 1
     count = outlines.shape[0]
@@ -247,22 +282,22 @@ def _cues(sums, outlines, x, y, u, v, evidence, scene):  # type: ignore[no-untyp
         x0, x1, row = outline
         wide = x1 - x0
         _look(sums, outline, scene, found[k])
-        highest = _weigh(outline, x, y, u, v, evidence, scene[0], scene[1], found[k])
+        rear = rear_width(x0, x1, row - scene[0], scene[1], scene[2], width)
+        highest = _weigh(outline, rear, x, y, u, v, evidence, scene[0], scene[1], found[k])
         found[count + k] = found[k]
         for tall in range(2):
             index = count * tall + k
-            top, strength = roof(sums, x0, x1, row, highest, tall == 1)
+            top, strength = roof(sums, x0, x1, row, rear, highest, tall == 1)
             boxes[index] = (x0, top, x1, row)
             found[index, Cue.ROOF] = strength
-            found[index, Cue.TALLNESS] = (row - top) / wide
+            found[index, Cue.TALLNESS] = (row - top) / rear
             first, last = int(top), int(row - 0.08 * wide)
             level = mean(sums, ACROSS, int(x0 - 0.5 * wide), first, int(x1 + 0.5 * wide), last) + 2.0
-            frame = 4.0
-            if x0 >= 3.0:
-                frame = min(frame, side(sums, x0, first, last) / level)
-            if x1 <= width - 3.0:
-                frame = min(frame, side(sums, x1, first, last) / level)
-            found[index, Cue.FRAME] = frame
+            found[index, Cue.FRAME] = _weaker_side(sums, x0, x1, first, last, level)
+            above = int(top - ABOVE * rear)
+            found[index, Cue.SIDE_ABOVE] = _weaker_side(sums, x0, x1, above, first - 1, level)
+        found[k, Cue.OTHER_ROOF] = found[count + k, Cue.ROOF]
+        found[count + k, Cue.OTHER_ROOF] = found[k, Cue.ROOF]
     return found, boxes
 
 

@@ -27,11 +27,13 @@ class Picture:
 
     Attributes:
         grey: (h, w) uint8, brightness that leans to red, so that tail lamps and red cars stay visible.
+        red: (h, w) uint8, how much redder than green: tail lamps.
         scale: Original px per working px.
         brightness: Mean of ``grey``.
     """
 
     grey: NDArray[np.uint8]
+    red: NDArray[np.uint8]
     scale: float
     brightness: float
 
@@ -72,8 +74,10 @@ def working_picture(image: NDArray[np.uint8]) -> Picture:
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
     # 0.44, 0.47, 0.09 of red, green and blue.
     grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
-    _lean(grey.reshape(-1), cv2.extractChannel(image, 0).reshape(-1))
-    return Picture(grey=grey, scale=width / grey.shape[1], brightness=float(cv2.mean(grey)[0]))
+    red = cv2.extractChannel(image, 0)
+    _lean(grey.reshape(-1), red.reshape(-1))
+    redder = np.asarray(cv2.subtract(red, cv2.extractChannel(image, 1)), np.uint8)
+    return Picture(grey=grey, red=redder, scale=width / grey.shape[1], brightness=float(cv2.mean(grey)[0]))
 
 
 def find_features(picture: Picture, top: int, bottom: int) -> Features:

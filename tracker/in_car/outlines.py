@@ -43,6 +43,14 @@ def rear_edges(x0, x1, contact, middle, focal):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def rear_width(x0, x1, contact, middle, focal, width):  # type: ignore[no-untyped-def]
+    """Return the width of the rear; where the frame cuts the vehicle off it is no less than usual."""
+    a, b = rear_edges(x0, x1, contact, middle, focal)
+    cut = x0 < 3.0 or x1 > width - 3.0
+    return max(b - a, (1.0 if cut else 0.4) * REAR * contact)
+
+
+@njit(cache=True)
 def side(sums, place, top, bottom):  # type: ignore[no-untyped-def]
     """Return the strength of the strongest vertical edge within a pixel of a place, in grey levels."""
     best = 0.0
@@ -74,7 +82,7 @@ def foot(sums, left, right, row, play, level):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def roof(sums, x0, x1, row, body_top, tall):  # type: ignore[no-untyped-def]
+def roof(sums, x0, x1, row, rear, body_top, tall):  # type: ignore[no-untyped-def]
     """Return the likeliest row of the roof over a vehicle's sides and foot, and how strong the edge is there.
 
     Args:
@@ -82,6 +90,7 @@ def roof(sums, x0, x1, row, body_top, tall):  # type: ignore[no-untyped-def]
         x0: Px.
         x1: Px.
         row: Of the contact with the ground.
+        rear: Width of the vehicle's rear, to which its height is in proportion.
         body_top: Row of the highest point that moves with the vehicle: it lies under the roof.
         tall: Whether a van's or a lorry's roof is sought, or a car's.
     """
@@ -89,19 +98,19 @@ def roof(sums, x0, x1, row, body_top, tall):  # type: ignore[no-untyped-def]
     wide = x1 - x0
     left, right = int(max(x0 + 0.12 * wide, 0.0)), int(min(x1 - 0.12 * wide, width))
     usual, spread = (TALL_ASPECT, TALL_SPREAD) if tall else (ASPECT, ASPECT_SPREAD)
-    first = int(max(row - (TALLEST if tall else DIVIDE) * wide, 2))
-    last = int(row - (DIVIDE if tall else LOWEST) * wide)
+    first = int(max(row - (TALLEST if tall else DIVIDE) * rear, 2))
+    last = int(row - (DIVIDE if tall else LOWEST) * rear)
     level = mean(sums, DOWN, left, first, right, int(row)) + 3.0
-    best, found, strength = -1e9, row - usual * wide, 0.0
+    best, found, strength = -1e9, row - usual * rear, 0.0
     for i in range(first, last):
-        off = ((row - i) / wide - usual) / spread
+        off = ((row - i) / rear - usual) / spread
         least, total = 1e9, 0.0
         for part in range(3):
             a, b = left + (part * (right - left)) // 3, left + ((part + 1) * (right - left)) // 3
             value = min(abs(mean(sums, SIGNED, a, i, b, i + 1)) / level, 4.0)
             least = min(least, value)
             total += value / 3.0
-        beyond = min(max((i - body_top) / wide - 0.04, 0.0) * 12.0, 4.0)
+        beyond = min(max((i - body_top) / rear - 0.04, 0.0) * 12.0, 4.0)
         value = 0.5 * least + 0.7 * total - 0.5 * off * off - beyond
         if value > best:
             best, found, strength = value, float(i), 0.5 * (least + total)

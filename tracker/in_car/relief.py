@@ -9,8 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 # Layers of the sums: absolute steps from one column to the next, steps from one row to the next (positive
-# where it gets brighter downward), their absolute values, and the brightness itself.
-ACROSS, SIGNED, DOWN, BRIGHT = 0, 1, 2, 3
+# where it gets brighter downward), their absolute values, the brightness itself, and how red it is.
+ACROSS, SIGNED, DOWN, BRIGHT, RED = 0, 1, 2, 3, 4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,7 +18,7 @@ class Relief:
     """A picture's integral images, and what is known of the scene.
 
     Attributes:
-        sums: (h + 1, w + 1, 4) int32, in half grey levels, the layers side by side.
+        sums: (h + 1, w + 1, 5) int32, in half grey levels, the layers side by side.
         horizon: Row, px.
         middle: Column of the focus of expansion, px.
         focal: Px.
@@ -31,13 +31,14 @@ class Relief:
 
 
 @njit(cache=True)
-def _integrals(grey):  # type: ignore[no-untyped-def]
+def _integrals(grey, redness):  # type: ignore[no-untyped-def]
     height, width = grey.shape
-    sums = np.empty((height + 1, width + 1, 4), np.int32)
+    sums = np.empty((height + 1, width + 1, 5), np.int32)
     sums[0] = 0
     # Of each column down to the present row.
     across, bright = np.zeros(width, np.int32), np.zeros(width, np.int32)
     signed, down = np.zeros(width, np.int32), np.zeros(width, np.int32)
+    red = np.zeros(width, np.int32)
     inner = across[2 : width - 1]
     for i in range(height):
         here = grey[i]
@@ -46,6 +47,7 @@ def _integrals(grey):  # type: ignore[no-untyped-def]
             inner[j] += abs(np.int32(place[j]) + np.int32(right[j]) - np.int32(left[j]) - np.int32(before[j]))
         for j in range(width):
             bright[j] += np.int32(2) * np.int32(here[j])
+            red[j] += np.int32(2) * np.int32(redness[i, j])
         if 2 <= i < height - 1:
             top, above, below = grey[i - 2], grey[i - 1], grey[i + 1]
             for j in range(width):
@@ -54,22 +56,26 @@ def _integrals(grey):  # type: ignore[no-untyped-def]
                 down[j] += abs(step)
         row = sums[i + 1]
         row[0] = 0
-        a, s, d, b = np.int32(0), np.int32(0), np.int32(0), np.int32(0)
+        a, s, d, b, r = np.int32(0), np.int32(0), np.int32(0), np.int32(0), np.int32(0)
         for j in range(width):
             a += across[j]
             s += signed[j]
             d += down[j]
             b += bright[j]
+            r += red[j]
             row[j + 1, 0] = a
             row[j + 1, 1] = s
             row[j + 1, 2] = d
             row[j + 1, 3] = b
+            row[j + 1, 4] = r
     return sums
 
 
-def make_relief(grey: NDArray[np.uint8], *, horizon: float, middle: float, focal: float) -> Relief:
-    """Sum up a picture (h, w), which is at least four pixels wide."""
-    return Relief(sums=_integrals(grey), horizon=horizon, middle=middle, focal=focal)
+def make_relief(
+    grey: NDArray[np.uint8], red: NDArray[np.uint8], *, horizon: float, middle: float, focal: float
+) -> Relief:
+    """Sum up a picture (h, w), which is at least four pixels wide, and how red it is (h, w)."""
+    return Relief(sums=_integrals(grey, red), horizon=horizon, middle=middle, focal=focal)
 
 
 @njit(cache=True)

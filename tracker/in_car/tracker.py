@@ -34,6 +34,8 @@ NEAR_ROWS = 0.11
 # Shares of a vehicle's width: a trace so far inside its sides is the vehicle's; so far outside it may be the
 # vehicle's edge or the background next to it.
 INNER, RIM = 0.05, 0.06
+# What speaks against a trace in no vehicle's box being a car's, as log odds.
+UNBOXED = 1.8
 # Frames that a point must have been followed before its motion says anything.
 RIPE = 4
 
@@ -103,7 +105,7 @@ class InCarTracker:
         self._front.horizon, self._front.centre_x = horizon * scale, float(ego.focus[0]) * scale
         self._front.look(picture)
         self._vehicles.step(
-            grey,
+            picture,
             points,
             moved * (CORRELATION / np.maximum(seconds, 1e-3))[:, None],
             ego,
@@ -139,6 +141,7 @@ class InCarTracker:
         owners = _in_boxes(traces, tracks, INNER)
         rims = _in_boxes(traces, tracks, -RIM)
         near = self._nearby_evidence(traces, scale)
+        cast = _at_feet(traces, tracks)
         labels = np.zeros(len(traces), np.uint8)
         chances = np.full(len(traces), 0.5)
         sure = dict(zip(tracks.ids.tolist(), (tracks.status != Status.TENTATIVE).tolist(), strict=True))
@@ -149,10 +152,12 @@ class InCarTracker:
                 gain = 3.0
             elif owner:
                 gain = 0.5 * near[index]
+            elif cast[index]:
+                gain = min(near[index], 0.0) - UNBOXED
             elif rims[index] and sure[rims[index]]:
                 gain = near[index]
             else:
-                gain = near[index] - 1.5
+                gain = near[index] - UNBOXED
             odds = float(np.clip(odds + gain / (self._info.rate * CORRELATION), -5.0, 5.0))
             odds_now[trace] = odds
             if traces.age[index] >= 0.3:
@@ -187,6 +192,18 @@ class InCarTracker:
         )
         count = close.sum(1)
         return np.asarray((close * evidence[None]).sum(1) / np.maximum(count, 1))
+
+
+def _at_feet(traces: TraceSet, tracks: Tracks) -> NDArray[np.bool_]:
+    """Tell which traces (N,) lie on the road around or before a track's foot.
+
+    There its shadow and its mirror image in a wet road move along with it.
+    """
+    boxes = tracks.boxes[tracks.status != Status.TENTATIVE]
+    wide, tall = boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]
+    x, y = traces.x[:, None], traces.y[:, None]
+    beside = (x > boxes[:, 0] - wide) & (x < boxes[:, 2] + wide)
+    return np.asarray((beside & (y > boxes[:, 3] - 0.1 * tall) & (y < boxes[:, 3] + 1.5 * tall)).any(1))
 
 
 def _in_boxes(traces: TraceSet, tracks: Tracks, margin: float) -> NDArray[np.int64]:

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.in_car.cues import BODY_PLAY, BODY_SHARE, cues
+from tracker.in_car.features import Picture
 from tracker.in_car.outline_odds import log_odds
 from tracker.in_car.outlines import outlines
 from tracker.in_car.points import PointStore
-from tracker.in_car.relief import Relief, make_relief
+from tracker.in_car.relief import RED, Relief, make_relief
 from tracker.in_car.yaw import EgoMotion
 from tracker.types import Status
 
@@ -40,6 +41,9 @@ SAME, TAKEN = 0.55, 0.35
 CORRELATION = 0.35
 # Log odds from which a point may belong to a vehicle, and from which it may while the ego stands.
 LIKELY, UNCLEAR = 1.0, -0.5
+# Difference in redness, grey levels, between so many px around a point and so much wider surroundings, from
+# which on it may be on a tail lamp. Its vehicle may stand while the ego moves, and so move like the scenery.
+LAMP_RED, LAMP_REACH, AROUND = 25.0, 2, 10
 # Ego speed below which a look tells less and less that the last one did not, m/s.
 WALK = 5.0
 
@@ -114,12 +118,12 @@ class VehicleStore:
         self.sighting: Sighting | None = None
 
     def step(
-        self, grey: NDArray[np.uint8], points: PointStore, moved: Floats, ego: EgoMotion, farthest: float
+        self, picture: Picture, points: PointStore, moved: Floats, ego: EgoMotion, farthest: float
     ) -> None:
         """Advance by one frame.
 
         Args:
-            grey: (h, w).
+            picture: Of this frame.
             points: Followed into this frame; their owners are updated.
             moved: (N, 2) displacement of each point over `CORRELATION` seconds, px.
             ego: The camera's own motion.
@@ -130,10 +134,11 @@ class VehicleStore:
             self._carry(vehicle, points, moved)
         self.sighting = None
         if self._frame % SEARCH == 0:
-            relief = make_relief(grey, horizon=horizon, middle=float(ego.focus[0]), focal=ego.focal)
+            middle = float(ego.focus[0])
+            relief = make_relief(picture.grey, picture.red, horizon=horizon, middle=middle, focal=ego.focal)
             self._look(relief, points, moved, ego.speed, farthest)
         self._frame += 1
-        self._end(grey, points, horizon)
+        self._end(picture.grey.shape, points, horizon)
         self._join(points, ego.speed)
 
     def _look(self, relief: Relief, points: PointStore, moved: Floats, speed: float, farthest: float) -> None:
@@ -141,7 +146,8 @@ class VehicleStore:
         ripe = points.age >= 4
         # While the ego stands nothing moves, and what did not move against a vehicle may be one.
         least = LIKELY if speed > WALK else UNCLEAR
-        likely = ripe & (points.evidence > least) & (points.position[:, 1] > relief.horizon + 2.0)
+        free = (points.evidence > least) | _on_lamp(relief, points.position)
+        likely = ripe & free & (points.position[:, 1] > relief.horizon + 2.0)
         shape = len(relief.sums) - 1, relief.sums.shape[1] - 1
         expected = np.array([_outline(vehicle.box, *shape) for vehicle in self.vehicles]).reshape(-1, 3)
         expected[:, 2] = np.maximum(expected[:, 2], relief.horizon + 4.0)
@@ -165,7 +171,7 @@ class VehicleStore:
         for index in first + np.argsort(-odds[first:], kind="stable"):
             if odds[index] < BEGIN:
                 break
-            self._begin(windows[index], points, ripe & (points.owner == 0), relief.horizon)
+            self._begin(windows[index], points, likely & (points.owner == 0), relief.horizon)
 
     def _hold(
         self,
@@ -271,9 +277,9 @@ class VehicleStore:
         half = 0.5 * np.array([box[2] - box[0], box[3] - box[1]]) * (1.0 + vehicle.growth)
         vehicle.box = np.concatenate([middle - half, middle + half])
 
-    def _end(self, grey: NDArray[np.uint8], points: PointStore, horizon: float) -> None:
+    def _end(self, shape: tuple[int, ...], points: PointStore, horizon: float) -> None:
         """Give up vehicles that left, were lost, never proved themselves, or are another's part."""
-        height, width = grey.shape
+        height, width = shape
         patience = 0.5 * self._rate
         kept: list[Vehicle] = []
         for vehicle in sorted(self.vehicles, key=lambda one: (not one.confirmed, -one.odds, one.id)):
@@ -322,8 +328,7 @@ class VehicleStore:
             return
         wide, tall = box[2] - box[0], box[3] - box[1]
         x, y = points.position.T
-        members = free & (points.evidence > 0.5)
-        members &= (x > box[0] - 0.05 * wide) & (x < box[2] + 0.05 * wide)
+        members = free & (x > box[0] - 0.05 * wide) & (x < box[2] + 0.05 * wide)
         members &= (y > box[1] - 0.05 * tall) & (y < box[3] + 0.05 * tall)
         if members.sum() < 1:
             return
@@ -339,6 +344,23 @@ class VehicleStore:
 def _outline(box: Floats, height: int, width: int) -> tuple[float, float, float]:
     """Return what of a box's sides and foot lies in the picture: x0, x1, row."""
     return max(float(box[0]), 0.0), min(float(box[2]), float(width)), min(float(box[3]), height - 1.0)
+
+
+def _on_lamp(relief: Relief, position: Floats) -> NDArray[np.bool_]:
+    """Tell which points (N, 2) may be on a tail lamp (N,): redder than what is around."""
+    column, row = position.astype(np.int64).T
+    near, wide = (_redness(relief, column, row, reach) for reach in (LAMP_REACH, AROUND))
+    return np.asarray(near - wide > LAMP_RED)
+
+
+def _redness(relief: Relief, column: NDArray[np.int64], row: NDArray[np.int64], reach: int) -> Floats:
+    """Return the mean redness (N,) within so many px of pixels (N,)."""
+    red = relief.sums[..., RED]
+    height, width = red.shape
+    x0, x1 = (column - reach).clip(0), (column + reach + 1).clip(0, width - 1)
+    y0, y1 = (row - reach).clip(0), (row + reach + 1).clip(0, height - 1)
+    total = 0.5 * (red[y1, x1] - red[y0, x1] - red[y1, x0] + red[y0, x0])
+    return np.asarray(total / ((x1 - x0) * (y1 - y0)))
 
 
 def covered(box: Floats, other: Floats) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
-from tracker.in_car.relief import ACROSS, BRIGHT, DOWN, SIGNED, make_relief
+from tracker.in_car.relief import ACROSS, BRIGHT, DOWN, RED, SIGNED, make_relief
 
 
 @st.composite
@@ -16,10 +16,12 @@ def pictures(draw, least=4, most=24):
     return rng.integers(0, draw(st.sampled_from([2, 40, 256])), (height, width)).astype(np.uint8)
 
 
-def layers(grey):
-    """The four layers of a picture, pixel by pixel, in half grey levels: each a dict of its own."""
+def layers(grey, red=None):
+    """The five layers of a picture, pixel by pixel, in half grey levels."""
     height, width = grey.shape
-    found = np.zeros((4, height, width), int)
+    found = np.zeros((5, height, width), int)
+    if red is not None:
+        found[RED] = 2 * red.astype(int)
     at = grey.astype(int)
     for i in range(height):
         for j in range(width):
@@ -61,8 +63,15 @@ def drawn_cars(cars, shape=(240, 320), horizon=110, seed=0):
     return np.clip(np.round(grey), 0, 255).astype(np.uint8), np.array(boxes, float)
 
 
-def relief_of(grey, horizon=None, middle=None, focal=300.0):
-    """A picture's relief, its horizon and middle in the middle where none are given."""
+def redness(grey):
+    """Some redness for a picture."""
+    return np.ascontiguousarray(grey[::-1, ::-1] // 2)
+
+
+def relief_of(grey, horizon=None, middle=None, focal=300.0, red=None):
+    """A picture's relief, grey and its horizon and middle in the middle where none are given."""
     height, width = grey.shape
     horizon = 0.45 * height if horizon is None else horizon
-    return make_relief(grey, horizon=horizon, middle=0.5 * width if middle is None else middle, focal=focal)
+    red = np.zeros_like(grey) if red is None else red
+    middle = 0.5 * width if middle is None else middle
+    return make_relief(grey, red, horizon=horizon, middle=middle, focal=focal)

@@ -9,13 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tracker.in_car.reliefs import drawn_cars, layers, pictures, plain_mean, relief_of
+from tests.tracker.in_car.reliefs import drawn_cars, layers, pictures, plain_mean, redness, relief_of
 from tests.tracker.in_car.test_outlines import plain_foot, plain_side
 from tracker.in_car.cues import (
     BODY_PLAY,
     BODY_SHARE,
     CLEAR,
     COUNT,
+    LAMP_BANDS,
+    LAMP_TALL,
+    LAMP_TOP,
+    LAMP_WIDE,
     MIRROR,
     MOST,
     REACH,
@@ -24,10 +28,13 @@ from tracker.in_car.cues import (
     _weigh,
     cues,
 )
-from tracker.in_car.outlines import FRAME_SIDE, REAR, rear_edges
-from tracker.in_car.relief import ACROSS, BRIGHT, DOWN
+from tracker.in_car.outlines import FRAME_SIDE, REAR, rear_edges, rear_width
+from tracker.in_car.relief import ACROSS, BRIGHT, DOWN, RED
 
-LOOKED = [cue for cue in Cue if cue < Cue.FOR and cue not in (Cue.FRAME, Cue.TALLNESS, Cue.ROOF)]
+LAMPS = [Cue.WEAKER_LAMP, Cue.STRONGER_LAMP, Cue.RED_BETWEEN]
+ROOFED = [Cue.FRAME, Cue.TALLNESS, Cue.ROOF, Cue.OTHER_ROOF, Cue.SIDE_ABOVE]
+LOOKED = [cue for cue in Cue if cue < Cue.FOR and cue not in ROOFED] + LAMPS
+WEIGHED = [cue for cue in Cue if cue >= Cue.FOR and cue not in LAMPS + ROOFED]
 
 
 def plain_look(found, outline, scene):
@@ -85,6 +92,15 @@ def plain_look(found, outline, scene):
     beside = box(ACROSS, x0 - 0.4 * wide, x0 - 0.06 * wide, low)
     beside += box(ACROSS, x1 + 0.06 * wide, x1 + 0.4 * wide, low)
     cue[Cue.EDGES_BESIDE] = min(0.5 * beside / level, 3.0)
+    reach = max(LAMP_WIDE * (b - a), 2.0)
+    lamps = np.zeros((3, LAMP_BANDS))
+    for band in range(LAMP_BANDS):
+        first = int(row - (LAMP_TOP - band * LAMP_TALL) * usual)
+        rows = first, max(int(row - (LAMP_TOP - (band + 1) * LAMP_TALL) * usual), first + 1)
+        spans = (a, a + reach), (b - reach, b), (a + 1.3 * reach, b - 1.3 * reach)
+        lamps[:, band] = [max(box(RED, *span, rows), 0.0) for span in spans]
+    cue[Cue.WEAKER_LAMP], cue[Cue.STRONGER_LAMP] = sorted(lamps[:2].max(1))
+    cue[Cue.RED_BETWEEN] = lamps[2].max()
     bounds = a + (b - a) * np.arange(MIRROR + 1) / MIRROR
     profile = np.array([box(ACROSS, bounds[k], int(bounds[k + 1]) + 1, low) for k in range(MIRROR)])
     profile -= profile.mean()
@@ -101,8 +117,9 @@ def test_look_measures_what_the_rectangles_hold(grey, seed):
     outline = x0, rng.uniform(x0 + 5, width), float(rng.integers(12, height))
     scene = 5.0, rng.uniform(0, width), 50.0
     measured = np.zeros(COUNT)
-    _look(relief_of(grey).sums, outline, scene, measured)
-    expected = plain_look(layers(grey), outline, scene)
+    red = redness(grey)
+    _look(relief_of(grey, red=red).sums, outline, scene, measured)
+    expected = plain_look(layers(grey, red), outline, scene)
     assert set(expected) == set(LOOKED)
     feet = Cue.FOOT_LEAST, Cue.FOOT_MEAN
     # Of two feet equally good to the last bit either may be taken.
@@ -111,17 +128,17 @@ def test_look_measures_what_the_rectangles_hold(grey, seed):
         assert measured[cue] == pytest.approx(expected[cue], abs=1e-8), cue
 
 
-def plain_weigh(outline, x, y, moved, evidence, horizon, middle):
+def plain_weigh(outline, rear, x, y, moved, evidence, horizon, middle):
     """The cues of the points, by sets of points."""
     x0, x1, row = outline
     wide = x1 - x0
-    play, top = 0.03 * wide + 1.0, row - 1.2 * wide
+    play, top = 0.03 * wide + 1.0, row - 1.2 * rear
     value = np.clip(evidence, -MOST, MOST)
     beside = (x < x0 - play) | (x > x1 + play)
     inside = ~beside & (y >= top) & (y <= row + play)
     far = inside & (y < horizon + 2)
     worth = np.where(far, np.minimum(value, 0.5), value)
-    over = y < row - 0.8 * wide
+    over = y < row - 0.8 * rear
     speak = inside & (worth > CLEAR)
     total = worth[inside & (worth > 0) & ((worth > CLEAR) | ~over)].sum()
     bars = inside & (worth <= 0) & ~over
@@ -139,7 +156,7 @@ def plain_weigh(outline, x, y, moved, evidence, horizon, middle):
     }
     if not speak.any():
         cue |= {Cue.GAP_INNER: 1.0, Cue.GAP_OUTER: 1.0, Cue.GAP_BELOW: 1.0, Cue.GAP_ABOVE: 1.2}
-        return cue, row - 0.5 * wide
+        return cue, row - 0.5 * rear
     px, py, weights = x[speak], y[speak], worth[speak]
     centre = np.average(moved[speak], axis=0, weights=weights)
     allowed = BODY_PLAY + BODY_SHARE * wide
@@ -147,14 +164,13 @@ def plain_weigh(outline, x, y, moved, evidence, horizon, middle):
     cue[Cue.SCATTER] = min(scatter / allowed**2, 9.0)
     gaps = (px.min() - x0) / wide, (x1 - px.max()) / wide
     cue[Cue.GAP_INNER], cue[Cue.GAP_OUTER] = gaps if 0.5 * (x0 + x1) > middle else gaps[::-1]
-    cue[Cue.GAP_ABOVE], cue[Cue.GAP_BELOW] = (py.min() - top) / wide, (row - py.max()) / wide
-    for name, place in ((Cue.SPREAD_X, px), (Cue.SPREAD_Y, py)):
-        cue[name] = (
-            math.sqrt(np.average((place - np.average(place, weights=weights)) ** 2, weights=weights)) / wide
-        )
+    cue[Cue.GAP_ABOVE], cue[Cue.GAP_BELOW] = (py.min() - top) / rear, (row - py.max()) / rear
+    for name, place, unit in ((Cue.SPREAD_X, px, wide), (Cue.SPREAD_Y, py, rear)):
+        spread = np.average((place - np.average(place, weights=weights)) ** 2, weights=weights)
+        cue[name] = math.sqrt(spread) / unit
     reach = REACH * wide
     about = (
-        (x >= x0 - reach) & (x <= x1 + reach) & (y >= max(row - 0.8 * wide, horizon + 2)) & (y <= row + reach)
+        (x >= x0 - reach) & (x <= x1 + reach) & (y >= max(row - 0.8 * rear, horizon + 2)) & (y <= row + reach)
     )
     under, alongside = about & ~beside & (y > row + play), about & beside & (y <= row + play)
     along = (value > CLEAR) & (np.abs(moved - centre) < allowed).all(1)
@@ -175,12 +191,12 @@ def test_weigh_sums_up_the_points_in_and_around(seed, count):
     horizon, middle = rng.uniform(80, 130), rng.uniform(60, 220)
     measured = np.zeros(COUNT)
     u, v = moved[:, 0].copy(), moved[:, 1].copy()
-    highest = _weigh(outline, x, y, u, v, evidence, horizon, middle, measured)
-    expected, top = plain_weigh(outline, x, y, moved, evidence, horizon, middle)
+    rear = (outline[1] - outline[0]) * rng.uniform(0.4, 1.0)
+    highest = _weigh(outline, rear, x, y, u, v, evidence, horizon, middle, measured)
+    expected, top = plain_weigh(outline, rear, x, y, moved, evidence, horizon, middle)
     assert highest == pytest.approx(top)
-    for cue in Cue:
-        if cue >= Cue.FOR:
-            assert measured[cue] == pytest.approx(expected.get(cue, 0.0), abs=1e-6), cue
+    for cue in WEIGHED:
+        assert measured[cue] == pytest.approx(expected.get(cue, 0.0), abs=1e-6), cue
 
 
 def test_a_drawn_car_looks_like_one_and_a_shifted_outline_less():
@@ -200,6 +216,35 @@ def test_a_drawn_car_looks_like_one_and_a_shifted_outline_less():
     assert true[Cue.COUNT_FOR] == 9
     assert off[Cue.COUNT_FOR] < 9
     assert off[Cue.ALIKE_BESIDE] > 0.0 == true[Cue.ALIKE_BESIDE]
+
+
+def test_a_body_that_goes_on_above_its_roof_and_red_lamps_are_seen():
+    grey, _ = drawn_cars([(120, 165, 140)])
+    red = np.zeros_like(grey)
+    red[118:126, 121:128] = red[118:126, 157:164] = 120
+    tall = grey.copy()
+    tall[75:106, 120:165] = 60
+    outlines, none = np.array([[120.0, 165, 140]]), np.empty((0, 2))
+
+    def low_and_high(picture, red=None):
+        return cues(relief_of(picture, horizon=110.0, red=red), outlines, none, none, np.empty(0))[0]
+
+    car, lorry = low_and_high(grey, red), low_and_high(tall)
+    assert car[0, Cue.WEAKER_LAMP] > 20 > 1 > car[0, Cue.RED_BETWEEN]
+    assert lorry[0, Cue.WEAKER_LAMP] == 0.0
+    assert lorry[0, Cue.SIDE_ABOVE] > 5 * car[0, Cue.SIDE_ABOVE]
+    for found in (car, lorry):
+        assert found[0, Cue.OTHER_ROOF] == found[1, Cue.ROOF]
+        assert found[1, Cue.OTHER_ROOF] == found[0, Cue.ROOF]
+    assert car[0, Cue.OTHER_ROOF] < car[0, Cue.ROOF]
+    assert lorry[1, Cue.ROOF] > lorry[0, Cue.ROOF]
+
+
+def test_rear_of_what_the_frame_cuts_off_is_no_less_than_usual():
+    assert rear_width(300.0, 320.0, 40.0, 160.0, 400.0, 320) == REAR * 40.0
+    assert rear_width(200.0, 280.0, 40.0, 160.0, 400.0, 320) == pytest.approx(
+        80.0 - 40.0 * 3.5 * 40.0 / 400.0
+    )
 
 
 def test_a_brighter_picture_changes_no_cue_of_edges():

@@ -105,6 +105,7 @@ def test_working_picture_leans_to_red():
     picture = working_picture(image)
     expected = 0.8 * cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) + 0.2 * image[..., 0]
     assert np.array_equal(picture.grey, np.rint(expected))
+    assert np.array_equal(picture.red, np.maximum(image[..., 0].astype(int) - image[..., 1], 0))
     assert picture.brightness == pytest.approx(picture.grey.mean())
 
 

@@ -37,24 +37,24 @@ def plain_foot(found, left, right, row, play, level):
     return max(rated, key=lambda one: one[1] + one[2])
 
 
-def plain_roof(found, x0, x1, row, body_top, tall):
+def plain_roof(found, x0, x1, row, rear, body_top, tall):
     """Every row a roof may have."""
     width, wide = found.shape[2], x1 - x0
     left, right = int(max(x0 + 0.12 * wide, 0)), int(min(x1 - 0.12 * wide, width))
     usual, spread = (own.TALL_ASPECT, own.TALL_SPREAD) if tall else (own.ASPECT, own.ASPECT_SPREAD)
     low, high = (own.DIVIDE, own.TALLEST) if tall else (own.LOWEST, own.DIVIDE)
-    first = int(max(row - high * wide, 2))
+    first = int(max(row - high * rear, 2))
     level = plain_mean(found, DOWN, left, first, right, int(row)) + 3.0
-    best = (-1e9, row - usual * wide, 0.0)
-    for i in range(first, int(row - low * wide)):
+    best = (-1e9, row - usual * rear, 0.0)
+    for i in range(first, int(row - low * rear)):
         cuts = [left + k * (right - left) // 3 for k in range(4)]
         values = [
             min(abs(plain_mean(found, SIGNED, a, i, b, i + 1)) / level, 4.0)
             for a, b in itertools.pairwise(cuts)
         ]
         least, total = min(values), sum(values) / 3
-        beyond = np.clip(12.0 * max((i - body_top) / wide - 0.04, 0.0), 0.0, 4.0)
-        unusual = 0.5 * (((row - i) / wide - usual) / spread) ** 2
+        beyond = np.clip(12.0 * max((i - body_top) / rear - 0.04, 0.0), 0.0, 4.0)
+        unusual = 0.5 * (((row - i) / rear - usual) / spread) ** 2
         value = 0.5 * least + 0.7 * total - unusual - beyond
         if value > best[0]:
             best = (value, i, 0.5 * (least + total))
@@ -87,10 +87,19 @@ def test_foot_is_the_best_of_all_rows(grey, left, wide, row, play, level):
 
 
 @settings(max_examples=100, deadline=None)
-@given(pictures(10), Places, st.floats(5, 20), st.floats(6, 23), st.floats(0, 20), st.booleans())
-def test_roof_is_the_best_of_all_rows(grey, x0, wide, row, body_top, tall):
-    found = own.roof(relief_of(grey).sums, x0, x0 + wide, row, body_top, tall)
-    expected = plain_roof(layers(grey), x0, x0 + wide, row, body_top, tall)
+@given(
+    pictures(10),
+    Places,
+    st.floats(5, 20),
+    st.floats(6, 23),
+    st.floats(0.4, 1.2),
+    st.floats(0, 20),
+    st.booleans(),
+)
+def test_roof_is_the_best_of_all_rows(grey, x0, wide, row, share, body_top, tall):
+    rear = share * wide
+    found = own.roof(relief_of(grey).sums, x0, x0 + wide, row, rear, body_top, tall)
+    expected = plain_roof(layers(grey), x0, x0 + wide, row, rear, body_top, tall)
     assert found == pytest.approx(expected, abs=1e-9)
 
 

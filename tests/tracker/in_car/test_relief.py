@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tracker.in_car.reliefs import layers, pictures, plain_mean, relief_of
+from tests.tracker.in_car.reliefs import layers, pictures, plain_mean, redness, relief_of
 from tracker.in_car.relief import ACROSS, BRIGHT, SIGNED, mean
 
 
@@ -15,20 +15,22 @@ from tracker.in_car.relief import ACROSS, BRIGHT, SIGNED, mean
 @given(pictures())
 def test_sums_are_those_of_the_pixels(grey):
     height, width = grey.shape
-    sums, found = relief_of(grey).sums, layers(grey)
-    assert sums.shape == (height + 1, width + 1, 4)
-    for layer in range(4):
+    red = redness(grey)
+    sums, found = relief_of(grey, red=red).sums, layers(grey, red)
+    assert sums.shape == (height + 1, width + 1, 5)
+    for layer in range(5):
         for i in range(height + 1):
             for j in range(width + 1):
                 assert sums[i, j, layer] == found[layer][:i, :j].sum()
 
 
 @settings(max_examples=100, deadline=None)
-@given(pictures(), st.integers(0, 3), st.tuples(*[st.integers(-6, 30)] * 4))
+@given(pictures(), st.integers(0, 4), st.tuples(*[st.integers(-6, 30)] * 4))
 def test_mean_is_that_of_the_pixels_inside(grey, layer, box):
     x0, y0, x1, y1 = box
-    expected = plain_mean(layers(grey), layer, x0, y0, x1, y1) if x1 > x0 and y1 > y0 else 0.0
-    assert mean(relief_of(grey).sums, layer, x0, y0, x1, y1) == pytest.approx(expected, abs=1e-12)
+    red = redness(grey)
+    expected = plain_mean(layers(grey, red), layer, x0, y0, x1, y1) if x1 > x0 and y1 > y0 else 0.0
+    assert mean(relief_of(grey, red=red).sums, layer, x0, y0, x1, y1) == pytest.approx(expected, abs=1e-12)
 
 
 def test_an_edge_of_ten_levels_counts_twenty_half_levels_over_two_columns():

@@ -10,10 +10,19 @@ from hypothesis import strategies as st
 from scenarios import spec
 from scenarios.loop import run_episode
 from scenarios.score.summary import score
-from tests.tracker.in_car.reliefs import drawn_cars
+from tests.tracker.in_car.reliefs import drawn_cars, relief_of
 from tracker import registry
+from tracker.in_car.features import Picture
 from tracker.in_car.points import PointStore
-from tracker.in_car.vehicles import Vehicle, VehicleStore, covered
+from tracker.in_car.vehicles import (
+    AROUND,
+    LAMP_REACH,
+    LAMP_RED,
+    Vehicle,
+    VehicleStore,
+    _on_lamp,
+    covered,
+)
 from tracker.in_car.yaw import EgoMotion
 
 RATE = 30.0
@@ -37,7 +46,7 @@ def vehicle_at(box, **settings):
 
 
 def ended(store, points):
-    store._end(np.zeros((240, 320), np.uint8), points, HORIZON)
+    store._end((240, 320), points, HORIZON)
     return [vehicle.id for vehicle in store.vehicles]
 
 
@@ -141,9 +150,30 @@ def test_nothing_is_begun_where_no_point_moves_like_a_vehicle():
     points.evidence[:] = -3.0
     ego = EgoMotion(focal=300.0, focus=(160.0, HORIZON), sure=True, rate=RATE)
     store = VehicleStore(rate=RATE)
+    picture = Picture(grey=grey, red=np.zeros_like(grey), scale=1.0, brightness=float(grey.mean()))
     for _ in range(6):
-        store.step(grey, points, np.zeros((30, 2)), ego, 4.0)
+        store.step(picture, points, np.zeros((30, 2)), ego, 4.0)
     assert store.vehicles == []
+
+
+def test_points_on_lamps_are_redder_than_what_is_around():
+    rng = np.random.default_rng(3)
+    red = rng.integers(0, 30, (60, 80)).astype(np.uint8)
+    red[30:36, 20:26] = 140
+    relief = relief_of(np.zeros_like(red), red=red)
+    position = rng.uniform((0, 0), (80, 60), (200, 2))
+    position[0] = 23.0, 33.0
+    expected = []
+    for column, row in position.astype(int):
+        near, wide = (
+            red[max(row - k, 0) : row + k + 1, max(column - k, 0) : column + k + 1].mean()
+            for k in (LAMP_REACH, AROUND)
+        )
+        expected.append(near - wide > LAMP_RED)
+    found = _on_lamp(relief, position)
+    np.testing.assert_array_equal(found, expected)
+    assert found[0]
+    assert found.mean() < 0.1
 
 
 @pytest.fixture(scope="module")
