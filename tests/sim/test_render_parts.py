@@ -2,39 +2,12 @@ import numpy as np
 import pytest
 
 from sim.camera import Pose
-from sim.render.antialias import smooth_edges
 from sim.render.ground import cut, fractal, mark_table
 from sim.render.instances import Library, in_bands
 from sim.render.lamps import LIGHTS, LampPlan, halos, lights
 from sim.rng import stream
 from sim.world import FIRST_VEHICLE_ID, Lamps
 from tests.sim.toy_stage import CAMERA, MODELS, POSE, bodies, ground, stage, state
-
-
-def edge(shape: tuple[int, int], slope: float, step: float, samples: int) -> np.ndarray:
-    """Sample a slanted edge: dark below, bright above."""
-    fine = (np.arange(samples) + 0.5) / samples
-    y = (np.arange(shape[0])[:, None] + fine).ravel()
-    x = (np.arange(shape[1])[:, None] + fine).ravel()
-    inside = (y[:, None] < step + slope * x[None]).reshape(shape[0], samples, shape[1], samples)
-    return 40 + 170 * inside.mean(axis=(1, 3))
-
-
-@pytest.mark.parametrize("slope", [0.05, 0.11, 0.3, -0.2])
-def test_smoothed_stairs_are_nearer_to_the_true_edge(slope):
-    shape = (48, 64)
-    stairs, truth = edge(shape, slope, 20.3, 1), edge(shape, slope, 20.3, 16)
-    rgba = np.repeat(np.round(stairs).astype(np.uint8)[..., None], 4, axis=-1)
-    smooth = smooth_edges(rgba)[..., 0].astype(float)
-    before = np.abs(stairs - truth)[4:-4, 16:-16].sum()
-    after = np.abs(smooth - truth)[4:-4, 16:-16].sum()
-    assert after < 0.6 * before
-
-
-def test_flat_parts_and_levels_are_left_alone():
-    rgba = np.full((20, 30, 4), 90, np.uint8)
-    rgba[10:] = 180
-    np.testing.assert_array_equal(smooth_edges(rgba), rgba[..., :3])
 
 
 def test_stretches_hold_every_face_once_and_in_place():
