@@ -161,7 +161,7 @@ class Sensor:
         room = np.array(self._tile.shape) - image.shape[:2]
         shifts = rng.integers(0, room, size=(4, 2))
         planes, out = self._planes
-        cv2.split(image, planes)
+        cv2.split(image, list(planes))
         _develop(planes, self._falloff, gain, self._tile, shifts, self._amplitude, out)
         return self._recorded(out)
 

@@ -40,7 +40,7 @@ def _walk(
     change = 0
     for length in range(1, most + 1):
         place += along
-        change = np.int64(luma[place]) + np.int64(luma[place + across]) - level
+        change = int(np.int64(luma[place]) + np.int64(luma[place + across])) - level
         if 2 * abs(change) >= step:
             return length, change
     return most + 1, change
@@ -55,7 +55,7 @@ def _smooth(
     longest: int,
     out: NDArray[np.uint8],
 ) -> None:
-    """Mix the pixels ``where`` (places in the flat (H * W, ...) arrays) with a neighbour each, into ``out``."""
+    """Mix pixels with a neighbour each, into ``out``; ``where`` says which: places in the flat pictures."""
     rows = luma.size // columns
     for place in where:
         i = place // columns

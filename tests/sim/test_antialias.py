@@ -71,7 +71,7 @@ def smoothed_pixel(image: np.ndarray, luma: np.ndarray, i: int, j: int) -> np.nd
         """Pixels to the end of the edge, and how its level changes there; None without an end."""
         for length in range(1, 15):
             p = np.array([i, j]) + length * way
-            if not ((0 <= p).all() and (p < luma.shape).all()):
+            if not ((p >= 0).all() and (p < luma.shape).all()):
                 return length, None
             q = p + across
             change = (int(luma[tuple(p)]) + int(luma[tuple(q)]) - m - other) / 2
