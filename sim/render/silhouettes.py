@@ -84,7 +84,7 @@ def survey(covered: NDArray[np.uint32], plots: NDArray[np.void], hole: Ints) -> 
     Args:
         covered: The buffer: 1 where marked, else 0.
         plots: (N,) `PLOT` records.
-        hole: (4,) x0, y0, x1, y1 in the target: what lies in it does not count.
+        hole: (4,) x0, y0, x1, y1 in the target: what lies in it does not count, and is set to 0.
 
     Returns:
         (N, 5) count and x0, y0, x1, y1 in the target; all 0 if the count is 0.
