@@ -162,6 +162,11 @@ class QuickVehicle(IDMVehicle):  # type: ignore[misc]
         self.moved()
         self.on_state_update()
 
+    def on_state_update(self) -> None:
+        """Look for the own lane, unless the road is about to do it for all at once."""
+        if not getattr(self.road, "moving", False):
+            super().on_state_update()
+
     def _follow(self, lane_index: LaneIndex) -> float:
         front, rear = self.road.neighbour_vehicles(self, lane_index)
         return self.acceleration(ego_vehicle=self, front_vehicle=front, rear_vehicle=rear)

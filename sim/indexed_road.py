@@ -19,64 +19,12 @@ from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.objects import Landmark, RoadObject
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from sim.charts import CHART, NEAR, TOLERANCE, Floats, Ints, chart, closest, local, on_charts
+
 LaneIndex = tuple[str, str, int]
 
-TOLERANCE = 1e-6
-"""Metres. Decisions closer than this are left to highway-env; rounding errors are a million times smaller."""
 CELL = 32.0
 """Metres: side of a cell of the lanes' index. Smaller cells hold fewer lanes and are more."""
-NEAR = 12.0
-"""Metres around a lane within which cells know of it. Farther from all lanes, every lane is searched."""
-TWO_PI = 2 * math.pi
-
-
-class _Chart:
-    """A straight or circular lane as plain numbers: local coordinates to within `TOLERANCE`."""
-
-    __slots__ = ("half_turn", "half_width", "lane", "length", "margin", "numbers", "straight")
-
-    def __init__(self, lane: AbstractLane) -> None:
-        self.lane = lane
-        self.length = float(lane.length)
-        self.margin = float(lane.VEHICLE_LENGTH)
-        self.half_width = float(lane.width) / 2 + 1  # the margin of Road.neighbour_vehicles
-        self.straight = type(lane) is StraightLane
-        self.numbers: tuple[float, float, float, float, float]
-        if self.straight:
-            self.numbers = (*lane.start.tolist(), *lane.direction.tolist(), float(lane.heading))
-            self.half_turn = math.inf
-        else:
-            bend = float(lane.radius), float(lane.start_phase), float(lane.direction)
-            self.numbers = (*lane.center.tolist(), *bend)
-            self.half_turn = math.pi * bend[0]
-
-    def local(self, x: float, y: float) -> tuple[float, float]:
-        """Local coordinates of a position: along and across, metres."""
-        x0, y0, a, b, c = self.numbers
-        dx, dy = x - x0, y - y0
-        if self.straight:
-            return dx * a + dy * b, dy * a - dx * b
-        turn = (math.atan2(dy, dx) - b + math.pi) % TWO_PI - math.pi
-        return c * turn * a, c * (a - math.hypot(dx, dy))
-
-    def distance(self, x: float, y: float, heading: float) -> float:
-        """`AbstractLane.distance_with_heading`, metres."""
-        s, r = self.local(x, y)
-        _, _, radius, start, along = self.numbers
-        if not self.straight:
-            along = start + along * (s / radius + math.pi / 2)
-        angle = (heading - along + math.pi) % TWO_PI - math.pi
-        away = abs(r) + abs(angle)
-        if s < 0:
-            return away - s
-        return away + s - self.length if s > self.length else away
-
-    def slack(self, s: float, r: float) -> float:
-        """How far inside the lane `Road.neighbour_vehicles` sees a place; 0 where that is in doubt."""
-        slack = min(self.half_width - abs(r), s + self.margin, self.length + self.margin - s)
-        # Half a turn away, s jumps from one end of its range to the other.
-        return 0.0 if abs(slack) <= TOLERANCE or abs(abs(s) - self.half_turn) <= TOLERANCE else slack
 
 
 class IndexedNetwork(RoadNetwork):  # type: ignore[misc]
@@ -86,7 +34,8 @@ class IndexedNetwork(RoadNetwork):  # type: ignore[misc]
     indexed: it answers as highway-env does, and as slowly.
 
     Attributes:
-        charts: The lanes as numbers, or None where they are not indexed.
+        numbers: Number of each lane's chart, or None where they are not indexed.
+        charts: (L,) `CHART` records.
         sources: For each node the nodes from which roads lead to it, in the graph's order.
     """
 
@@ -94,8 +43,7 @@ class IndexedNetwork(RoadNetwork):  # type: ignore[misc]
         """Index the lanes of ``network``, whose graph is shared."""
         super().__init__()
         self.graph = network.graph
-        self.charts: dict[LaneIndex, _Chart] | None = None
-        self._cells: dict[tuple[int, int], list[tuple[LaneIndex, _Chart]]] = {}
+        self.numbers: dict[LaneIndex, int] | None = None
         self.sources: dict[str, list[str]] = {}
         for source, roads in self.graph.items():
             for target, road_lanes in roads.items():
@@ -103,45 +51,71 @@ class IndexedNetwork(RoadNetwork):  # type: ignore[misc]
                     self.sources.setdefault(target, []).append(source)
         lanes = self.lanes_dict()
         if all(_is_plain(lane) for lane in lanes.values()):
-            self.charts = {index: _Chart(lane) for index, lane in lanes.items()}
-            for index, chart in self.charts.items():
-                for cell in sorted(_cells_near(chart)):
-                    self._cells.setdefault(cell, []).append((index, chart))
+            self._lanes = list(lanes.items())
+            self.numbers = {index: number for number, index in enumerate(lanes)}
+            self.charts = np.array([chart(lane) for lane in lanes.values()], CHART)
+            self._frames = [row[:6] for row in self.charts.tolist()]
+            cells: dict[tuple[int, int], list[int]] = {}
+            for number, lane in enumerate(lanes.values()):
+                for cell in sorted(_cells_near(lane)):
+                    cells.setdefault(cell, []).append(number)
+            self._near = np.array([number for cell in cells.values() for number in cell], np.int64)
+            ends = np.cumsum([len(cell) for cell in cells.values()]).tolist()
+            self._spans = dict(zip(cells, zip([0, *ends[:-1]], ends, strict=True), strict=True))
 
-    def lanes_near(self, x: float, y: float) -> Sequence[tuple[LaneIndex, _Chart]]:
-        """Return all lanes within `NEAR` of a place, and some more."""
-        return self._cells.get((math.floor(x / CELL), math.floor(y / CELL)), ())
+    def along(self, number: int, position: Floats) -> float:
+        """Return how far along the chart of that number a position is, metres."""
+        return float(local.py_func(*self._frames[number], *position.tolist())[0])
+
+    def on_charts(self, places: Floats) -> tuple[Ints, Ints, Floats, NDArray[np.bool_]]:
+        """Find on which charts each of (N, 3) places is; see `sim.charts.on_charts`."""
+        finds: tuple[Ints, Ints, Floats, NDArray[np.bool_]] = on_charts(
+            self.charts, self._near, self._spans_of(places), places
+        )
+        return finds
+
+    def closest_lanes(self, places: Floats) -> list[tuple[LaneIndex, AbstractLane]]:
+        """Return index and lane of the one closest to each of (N, 3) places: x, y and heading."""
+        if self.numbers is None:
+            found = [-1] * len(places)
+        else:
+            found = closest(self.charts, self._near, self._spans_of(places), places).tolist()
+        return [
+            self._lanes[number] if number >= 0 else self._searched(place)
+            for number, place in zip(found, places, strict=True)
+        ]
 
     def get_closest_lane_index(self, position: Floats, heading: float | None = None) -> LaneIndex:
         """Return the index of the lane closest to a position and heading (see `RoadNetwork`)."""
-        if heading is not None:
-            x, y = position.tolist()
-            angle = float(heading)
-            found, best, second = None, NEAR, math.inf
-            for index, chart in self.lanes_near(x, y):
-                away = chart.distance(x, y, angle)
-                if away < best:
-                    found, best, second = index, away, best
-                elif away < second:
-                    second = away
-            if found is not None and second - best > TOLERANCE:
-                return found
-        closest: LaneIndex = super().get_closest_lane_index(position, heading)
-        return closest
+        if heading is None:
+            index: LaneIndex = super().get_closest_lane_index(position)
+            return index
+        return self.closest_lanes(np.array([[*position, heading]], float))[0][0]
+
+    def _searched(self, place: Floats) -> tuple[LaneIndex, AbstractLane]:
+        """What highway-env finds, among all lanes."""
+        index = super().get_closest_lane_index(place[:2], place[2])
+        return index, self.get_lane(index)
+
+    def _spans_of(self, places: Floats) -> Ints:
+        """Give (N, 2) where the numbers of the charts around each place begin and end."""
+        cells = np.floor(places[:, :2] / CELL).astype(int).tolist()
+        spans = self._spans
+        return np.array([spans.get((i, j), (0, 0)) for i, j in cells], np.int64).reshape(-1, 2)
 
 
 def _is_plain(lane: AbstractLane) -> bool:
-    """Whether a lane is one that `_Chart` knows, and lies with its margins within `NEAR`."""
+    """Whether a lane can be charted, and lies with its margins within `NEAR`."""
     return type(lane) in (StraightLane, CircularLane) and lane.width / 2 + 1 + lane.VEHICLE_LENGTH < NEAR
 
 
-def _cells_near(chart: _Chart) -> set[tuple[int, int]]:
+def _cells_near(lane: AbstractLane) -> set[tuple[int, int]]:
     """Cells that hold every point within `NEAR` of a lane."""
-    steps = 1 + math.ceil(chart.length / CELL)
+    steps = 1 + math.ceil(lane.length / CELL)
     pad = NEAR + CELL
     cells = set()
-    for s in np.linspace(0, chart.length, steps + 1):
-        x, y = chart.lane.position(s, 0)
+    for s in np.linspace(0, lane.length, steps + 1):
+        x, y = lane.position(s, 0)
         for i in range(math.floor((x - pad) / CELL), math.floor((x + pad) / CELL) + 1):
             for j in range(math.floor((y - pad) / CELL), math.floor((y + pad) / CELL) + 1):
                 cells.add((i, j))
@@ -221,9 +195,11 @@ class IndexedRoad(Road):  # type: ignore[misc]
     def __init__(self, network: RoadNetwork, **options: Any) -> None:
         """Index ``network``; ``options`` are those of `Road`."""
         super().__init__(network=IndexedNetwork(network), **options)
+        self.moving = False
+        """Whether vehicles need not look for their lanes: the road does when all have moved."""
         self._acting = False
         self._bodies: list[RoadObject] = []
-        self._rolls: dict[_Chart, _Roll] = {}
+        self._rolls: dict[int, _Roll] = {}
         self._queues: dict[LaneIndex, _Queue] = {}
 
     def act(self) -> None:
@@ -241,8 +217,16 @@ class IndexedRoad(Road):  # type: ignore[misc]
         Args:
             dt: Seconds.
         """
-        for vehicle in self.vehicles:
-            vehicle.step(dt)
+        self.moving = not self.record_history  # what is recorded has its lane
+        try:
+            for vehicle in self.vehicles:
+                vehicle.step(dt)
+        finally:
+            self.moving = False
+        if self.vehicles:
+            found = self.network.closest_lanes(_places(self.vehicles))
+            for vehicle, (index, lane) in zip(self.vehicles, found, strict=True):
+                vehicle.lane_index, vehicle.lane = index, lane
         bodies = [*self.vehicles, *self.objects]
         if len(bodies) > 1:
             self._collide(bodies, dt)
@@ -254,15 +238,15 @@ class IndexedRoad(Road):  # type: ignore[misc]
         lane_index = lane_index or vehicle.lane_index
         if not lane_index:
             return None, None
-        charts = self.network.charts
+        numbers = self.network.numbers
         found = None
-        if charts is not None and (chart := charts.get(lane_index)) is not None:
+        if numbers is not None and (number := numbers.get(lane_index)) is not None:
             if not self._acting:
                 self._index()
             queue = self._queues.get(lane_index)
             if queue is None:
                 queue = self._queues[lane_index] = _Queue(self._search_lanes(lane_index), self._bodies)
-            found = queue.around(vehicle, chart.local(*vehicle.position.tolist())[0])
+            found = queue.around(vehicle, self.network.along(number, vehicle.position))
         if found is None:
             found = super().neighbour_vehicles(vehicle, lane_index)
         return found
@@ -288,32 +272,32 @@ class IndexedRoad(Road):  # type: ignore[misc]
         """Note who is on which lane."""
         self._bodies = [b for b in [*self.vehicles, *self.objects] if not isinstance(b, Landmark)]
         self._rolls, self._queues = {}, {}
-        for number, body in enumerate(self._bodies):
-            x, y = body.position.tolist()
-            for _, chart in self.network.lanes_near(x, y):
-                s, r = chart.local(x, y)
-                slack = chart.slack(s, r)
-                if slack >= 0.0:
-                    roll = self._rolls.get(chart)
-                    if roll is None:
-                        roll = self._rolls[chart] = _Roll()
-                    roll.entries.append((number, s))
-                    roll.uncertain |= slack == 0.0
+        if self.network.numbers is None or not self._bodies:
+            return
+        finds = self.network.on_charts(_places(self._bodies))
+        for body, number, s, doubt in zip(*(part.tolist() for part in finds), strict=True):
+            roll = self._rolls.get(number)
+            if roll is None:
+                roll = self._rolls[number] = _Roll()
+            roll.entries.append((body, s))
+            roll.uncertain |= doubt
 
     def _search_lanes(self, lane_index: LaneIndex) -> list[tuple[_Roll, float]]:
         """Lanes that `Road.neighbour_vehicles` searches, in its order, with their offsets."""
-        charts: dict[LaneIndex, _Chart] = self.network.charts
+        numbers: dict[LaneIndex, int] = self.network.numbers
+        lengths = self.network.charts["length"]
         graph = self.network.graph
         origin, target, lane_id = lane_index
-        chart = charts[lane_index]
-        pieces = [(chart, 0.0)]
+        own = numbers[lane_index]
+        pieces = [(own, 0.0)]
         if self.neighbour_vehicles_connected_lanes:
             for onward, lanes in graph.get(target, {}).items():
                 if lanes:
-                    pieces.append((charts[target, onward, _same_or_first(lane_id, lanes)], chart.length))
+                    after = numbers[target, onward, _same_or_first(lane_id, lanes)]
+                    pieces.append((after, float(lengths[own])))
             for source in self.network.sources.get(origin, ()):
-                before = charts[source, origin, _same_or_first(lane_id, graph[source][origin])]
-                pieces.append((before, -before.length))
+                before = numbers[source, origin, _same_or_first(lane_id, graph[source][origin])]
+                pieces.append((before, -float(lengths[before])))
         nobody = _Roll()
         return [(self._rolls.get(piece, nobody), offset) for piece, offset in pieces]
 
@@ -340,6 +324,11 @@ class IndexedRoad(Road):  # type: ignore[misc]
                 continue
             if not _apart(bodies[i], bodies[j], dt):
                 bodies[i].handle_collisions(bodies[j], dt)
+
+
+def _places(bodies: Sequence[RoadObject]) -> Floats:
+    """Give (N, 3) x, y and heading of at least one body."""
+    return np.array([(*body.position.tolist(), body.heading) for body in bodies], float)
 
 
 def _same_or_first(lane_id: int, lanes: list[AbstractLane]) -> int:

@@ -112,12 +112,11 @@ class Simulation:
         state = self.scene.step(action)
         pose = self.scene.pose(state)
         clock.lap("world")
-        picture = self._renderer.render(state, camera, pose)
+        picture, silhouettes = self._renderer.observe(state, camera, pose)
         clock.lap("render")
         speed = state.ego.speed if state.ego is not None else 0.0
         image = self._sensor.expose(picture, state.tick, speed)
         clock.lap("sensor")
-        silhouettes = self._renderer.silhouettes(state, camera, pose)
         truth = frame_truth(state, picture, silhouettes, camera, pose)
         clock.lap("truth")
         return Observation(

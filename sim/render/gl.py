@@ -9,20 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.camera import Camera, Pose
-from sim.models import Surface
 from sim.render.antialias import smooth_edges
 from sim.render.context import check, context
 from sim.render.ground import MARGIN, cut, grain_texture, mark_table, road_texture
 from sim.render.instances import COMMAND, CONTACT, INSTANCE, Library, contacts, in_bands
 from sim.render.lamps import HALO, LIGHTS, Burning, LampPlan, halos, lights
+from sim.render.materials import material_table
 from sim.render.pool import PoolPass
 from sim.render.programs import program, set_uniforms
-from sim.render.silhouettes import SilhouettePass
-from sim.render.sky import HIGHEST, panorama
+from sim.render.silhouettes import PLOT, SilhouettePass
+from sim.render.sky import HIGHEST, panorama, screen_grid
 from sim.render.types import Picture, Silhouettes, Stage
 from sim.render.view import look_matrix, view_matrices
 from sim.textures import texture_array
-from sim.world import Bodies, WorldState
+from sim.world import SKY_ID, Bodies, WorldState
 
 _ROOM = 8192  # instances and draws in a frame
 
@@ -30,22 +30,6 @@ _SHADOW_REACH = 120.0  # metres within which bodies cast shadows
 _SHADOW_WIDEN = 2.5  # half-widths of the frame within which they do
 _BEAM = 44.0
 _BODY_LIGHTS = 4  # lamps that light bodies, of those that light the ground
-# Share of the body's colour (2: by the texture's alpha), reflection, more by the alpha, retro-reflection.
-_GLOSS = {
-    Surface.PAINT: (1.0, 0.055, 0.02, 0.0),
-    Surface.GLASS: (0.0, 0.22, 0.0, 0.0),
-    Surface.CHROME: (0.0, 0.45, 0.0, 0.0),
-    Surface.RUBBER: (0.0, 0.0, 0.0, 0.0),
-    Surface.PLASTIC: (0.0, 0.02, 0.0, 0.0),
-    Surface.PLATE: (0.0, 0.02, 0.0, 6.0),
-    Surface.TAIL_LAMP: (0.0, 0.05, 0.0, 0.0),
-    Surface.HEAD_LAMP: (0.0, 0.12, 0.0, 3.0),
-    Surface.CARGO: (1.0, 0.01, 0.0, 0.0),
-    Surface.FOLIAGE: (1.0, 0.0, 0.0, 0.0),
-    Surface.FACADE: (1.0, 0.0, 0.25, 0.0),
-    Surface.HILL: (1.0, 0.0, 0.0, 0.0),
-    Surface.SIGN: (2.0, 0.01, 0.0, 25.0),
-}
 
 
 class GlRenderer:
@@ -106,40 +90,60 @@ class GlRenderer:
         Raises:
             RenderError: If OpenGL reports an error.
         """
-        bodies = Bodies.concatenate(self._stage.scenery, state.vehicles)
-        selection = in_bands(bodies, self._library.select(bodies, camera, pose), pose)
-        instances = self._library.instances(bodies, selection, pose)
-        commands = self._library.commands(selection.meshes)
-        casters = self._library.select(bodies, camera, pose, widen=_SHADOW_WIDEN, coarsest=True)
-        casters = casters.within(bodies, pose, _SHADOW_REACH)
-        casters = in_bands(bodies, casters, pose)
-        shades = self._library.commands(casters.meshes)
-        resting = contacts(state.vehicles, pose)
-        stretches = self._ground.select(camera, pose)
-        view = view_matrices(camera, pose)
-        burning = self._lamps.burning(bodies, camera, pose, streets=self._streets)
-        glare = halos(burning, camera, night=self._stage.light.night)[:_ROOM]
         with context() as ctx:
-            self._instances.write(instances)
-            self._commands.write(commands)
-            self._casters.write(self._library.instances(bodies, casters, pose))
-            self._caster_commands.write(shades)
-            self._stretches.write(self._ground.stretches(stretches, pose))
-            self._ground_commands.write(self._ground.commands(stretches))
-            draws = (len(commands), len(stretches))
-            self._shadow_pass(ctx, view, len(shades), pose)
-            if self._pool is not None:
-                self._light_up(self._pool.program, burning, pose, LIGHTS)
-                self._light_up(self._body, burning, pose, _BODY_LIGHTS)
-                self._pool.draw(ctx, camera, pose)
-                self._pool.use(6, 7)
-            self._main_pass(ctx, view, draws)
-            self._contact_pass(ctx, view, resting)
-            self._sky_pass(ctx, camera, pose)
-            self._halo_pass(ctx, view, glare)
+            self._draw(ctx, state, camera, pose)
             rgba, ids, depth = self._read()
             check(ctx, "rendering")
         return Picture(colour=smooth_edges(rgba), ids=ids, depth=depth)
+
+    def silhouettes(self, state: WorldState, camera: Camera, pose: Pose) -> Silhouettes:
+        """Draw each vehicle alone, as the identity pass draws it."""
+        with context() as ctx:
+            drawn = self._silhouettes.draw(ctx, self._library, state.vehicles, camera, pose)
+            found: Silhouettes = self._silhouettes.count(ctx, drawn)
+            check(ctx, "drawing silhouettes")
+        return found
+
+    def observe(self, state: WorldState, camera: Camera, pose: Pose) -> tuple[Picture, Silhouettes]:
+        """Give what `render` and `silhouettes` give, in less time: they are drawn while this thread works."""
+        with context() as ctx:
+            self._draw(ctx, state, camera, pose)
+            drawn = self._silhouettes.draw(ctx, self._library, state.vehicles, camera, pose)
+            rgba, ids, depth = self._read()
+            check(ctx, "rendering")
+        colour = smooth_edges(rgba)
+        with context() as ctx:
+            found = self._silhouettes.count(ctx, drawn)
+            check(ctx, "drawing silhouettes")
+        return Picture(colour=colour, ids=ids, depth=depth), found
+
+    def _draw(self, ctx: Any, state: WorldState, camera: Camera, pose: Pose) -> None:
+        """Ask OpenGL to draw the picture."""
+        bodies = Bodies.concatenate(self._stage.scenery, state.vehicles)
+        selection = in_bands(bodies, self._library.select(bodies, camera, pose), pose)
+        commands = self._library.commands(selection.meshes)
+        casters = self._library.select(bodies, camera, pose, widen=_SHADOW_WIDEN, coarsest=True)
+        casters = in_bands(bodies, casters.within(bodies, pose, _SHADOW_REACH), pose)
+        shades = self._library.commands(casters.meshes)
+        stretches = self._ground.select(camera, pose)
+        view = view_matrices(camera, pose)
+        burning = self._lamps.burning(bodies, camera, pose, streets=self._streets)
+        self._instances.write(self._library.instances(bodies, selection, pose))
+        self._commands.write(commands)
+        self._casters.write(self._library.instances(bodies, casters, pose))
+        self._caster_commands.write(shades)
+        self._stretches.write(self._ground.stretches(stretches, pose))
+        self._ground_commands.write(self._ground.commands(stretches))
+        self._shadow_pass(ctx, view, len(shades), pose)
+        if self._pool is not None:
+            self._light_up(self._pool.program, burning, pose, LIGHTS)
+            self._light_up(self._body, burning, pose, _BODY_LIGHTS)
+            self._pool.draw(ctx, camera, pose)
+            self._pool.use(6, 7)
+        self._main_pass(ctx, view, (len(commands), len(stretches)))
+        self._contact_pass(ctx, view, contacts(state.vehicles, pose))
+        self._sky_pass(ctx, camera, pose)
+        self._halo_pass(ctx, view, halos(burning, camera, night=self._stage.light.night)[:_ROOM])
 
     def _shadow_pass(self, ctx: Any, view: dict[str, Any], draws: int, pose: Pose) -> None:
         self._mask.use()
@@ -218,20 +222,13 @@ class GlRenderer:
 
     def _read(self) -> tuple[NDArray[np.uint8], NDArray[np.uint32], NDArray[np.float32]]:
         width, height = self._size
-        ids = np.frombuffer(self._target.read(components=1, attachment=1, dtype="u4"), np.uint32)
-        depth = np.frombuffer(self._target.read(components=1, attachment=2, dtype="f4"), np.float32)
-        depth = np.where(ids == 0, np.float32(np.inf), depth)
-        rgba = np.frombuffer(self._target.read(components=4), np.uint8)
-        return rgba.reshape(height, width, 4), ids.reshape(height, width), depth.reshape(height, width)
-
-    def silhouettes(self, state: WorldState, camera: Camera, pose: Pose) -> Silhouettes:
-        """Draw each vehicle alone, as the identity pass draws it."""
-        with context() as ctx:
-            found: Silhouettes = self._silhouettes.draw(
-                ctx, self._alone, self._library, state.vehicles, camera, pose
-            )
-            check(ctx, "drawing silhouettes")
-        return found
+        ids, depth = np.empty((height, width), np.uint32), np.empty((height, width), np.float32)
+        rgba = np.empty((height, width, 4), np.uint8)
+        self._target.read_into(ids, components=1, attachment=1, dtype="u4")
+        self._target.read_into(depth, components=1, attachment=2, dtype="f4")
+        self._target.read_into(rgba, components=4)
+        np.copyto(depth, np.inf, where=ids == SKY_ID)
+        return rgba, ids, depth
 
     def _keep(self, thing: Any) -> Any:
         self._things.append(thing)
@@ -293,10 +290,12 @@ class GlRenderer:
         night = ("NIGHT",) if light.night else ()
         shared = ("light", "lamps") if light.night else ("light",)
         self._body_shadow = keep(program(ctx, "body", "mask", "SHADOW"))
-        self._body_shadow_array = self._bodies(ctx, self._body_shadow, self._casters, "3f 2f 3f 8x/i")
+        self._body_shadow_array = self._bodies(ctx, self._body_shadow, self._casters)
         self._alone = keep(program(ctx, "body", "alone", "ALONE"))
-        alone = self._bodies(ctx, self._alone, self._instances, "3f 2f 3f 4x 1u/i", "i_id")
-        self._silhouettes = keep(SilhouettePass(ctx, alone, self._instances, self._commands, self._size))
+        plots = keep(ctx.buffer(reserve=_ROOM * PLOT.itemsize, dynamic=True))
+        alone = self._bodies(ctx, self._alone, self._instances, (plots, "4i 1i/i", "i_box", "i_first"))
+        buffers = self._instances, plots, self._commands
+        self._silhouettes = keep(SilhouettePass(ctx, self._alone, alone, buffers, self._size))
         self._body = keep(program(ctx, "body", "body", "COLOUR", *night, shared=shared))
         self._body_array = keep(
             ctx.vertex_array(
@@ -346,10 +345,7 @@ class GlRenderer:
                 shader, **lit, u_textures=0, u_grain=1, u_road=2, u_shadow=3, u_panorama=4, u_marks=5
             )
             set_uniforms(shader, u_pool=6, u_mirror=7)
-        table = np.zeros((len(Surface), 4), "<f4")
-        for surface, row in _GLOSS.items():
-            table[surface] = row
-        set_uniforms(self._body, u_material=table.tobytes())
+        set_uniforms(self._body, u_material=material_table())
         for shader in (self._paved, self._land):
             set_uniforms(shader, u_paved=stage.ground.paved, u_margin=MARGIN, u_wet=light.wet)
             set_uniforms(shader, u_frame=tuple(map(float, self._size)))
@@ -379,22 +375,15 @@ class GlRenderer:
             )
         )
 
-    def _bodies(self, ctx: Any, shader: Any, instances: Any, layout: str, *more: str) -> Any:
+    def _bodies(self, ctx: Any, shader: Any, instances: Any, *more: tuple[Any, ...]) -> Any:
         return self._keep(
             ctx.vertex_array(
                 shader,
                 [
                     (self._vertices, "3f 24x", "in_position"),
-                    (instances, layout, "i_position", "i_turn", "i_scale", *more),
+                    (instances, "3f 2f 3f 8x/i", "i_position", "i_turn", "i_scale"),
+                    *more,
                 ],
                 self._faces,
             )
         )
-
-
-def screen_grid(columns: int = 16, rows: int = 12) -> NDArray[np.float32]:
-    """Return (6 * columns * rows, 2) corners of the triangles of a grid over clip space."""
-    x, y = np.linspace(-1, 1, columns + 1), np.linspace(-1, 1, rows + 1)
-    corners = np.stack(np.meshgrid(x, y), axis=-1)
-    a, b, c, d = corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]
-    return np.stack([a, b, c, c, b, d], axis=2).reshape(-1, 2).astype(np.float32)

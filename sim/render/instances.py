@@ -190,16 +190,6 @@ class Library:
         out["base_instance"] = starts
         return out
 
-    def single_commands(self, meshes: NDArray[np.int32]) -> NDArray[np.void]:
-        """Return (M,) `COMMAND` records, one for each instance."""
-        out = np.zeros(len(meshes), COMMAND)
-        out["count"] = self.count[meshes]
-        out["instances"] = 1
-        out["first"] = self.first[meshes]
-        out["base_vertex"] = self.base_vertex[meshes]
-        out["base_instance"] = np.arange(len(meshes))
-        return out
-
 
 def in_bands(bodies: Bodies, selection: Selection, pose: Pose) -> Selection:
     """Reorder by mesh within bands of distance: few draws, and still near before far."""

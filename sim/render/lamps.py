@@ -70,12 +70,13 @@ class LampPlan:
 
     def __init__(self, models: Sequence[Model]) -> None:
         self._sizes = np.array([model.size for model in models], float)
-        self._tail = [_centres(model, Surface.TAIL_LAMP) for model in models]
-        self._head = [_centres(model, Surface.HEAD_LAMP) for model in models]
-        self._street = [_centres(model, Surface.STREET_LAMP) for model in models]
+        self._tail, self._head, self._street = (
+            _Places.of([_centres(model, surface) for model in models])
+            for surface in (Surface.TAIL_LAMP, Surface.HEAD_LAMP, Surface.STREET_LAMP)
+        )
 
     def burning(self, bodies: Bodies, camera: Camera, pose: Pose, *, streets: bool) -> Burning:
-        """Collect the lamps that are on.
+        """Collect the lamps that are on, body by body.
 
         Args:
             bodies: All that may carry lamps.
@@ -87,36 +88,72 @@ class LampPlan:
         ahead = offset @ pose.rotation[2]
         near = (ahead > -20.0) & (ahead < 0.5 * camera.far)
         rows = np.flatnonzero(near & ((bodies.lamps != 0) | streets))
-        position, direction, colour, power, strength = [], [], [], [], []
-        for row in rows.tolist():
-            model, lamps = int(bodies.models[row]), int(bodies.lamps[row])
-            scale = bodies.sizes[row] / self._sizes[model]
-            cos, sin = np.cos(bodies.yaws[row]), np.sin(bodies.yaws[row])
-            forward = np.array([cos, sin, 0.0])
-            shown = []
-            if lamps & Lamps.BRAKE:
-                shown.append((self._tail[model], -forward, _BRAKE, 1.0, 6.0))
-            elif lamps & Lamps.TAIL:
-                shown.append((self._tail[model], -forward, _TAIL, 1.0, 5.0))
-            if lamps & Lamps.HEAD:
-                shown.append((self._head[model], np.array([cos, sin, -0.05]), _HEAD, 28.0, 14.0))
-            if streets:
-                shown.append((self._street[model], np.array([0.0, 0.0, -1.0]), _STREET, 2.0, 90.0))
-            for places, aim, tint, sharpness, reach in shown:
-                for place in places * scale:
-                    x, y = cos * place[0] - sin * place[1], sin * place[0] + cos * place[1]
-                    position.append(offset[row] + [x, y, place[2]])
-                    direction.append(aim)
-                    colour.append(tint)
-                    power.append(sharpness)
-                    strength.append(reach)
-        return Burning(
-            position=np.array(position).reshape(-1, 3),
-            direction=np.array(direction).reshape(-1, 3),
-            colour=np.array(colour).reshape(-1, 3),
-            power=np.array(power),
-            strength=np.array(strength),
+        lamps, models = bodies.lamps[rows], bodies.models[rows]
+        scale = bodies.sizes[rows] / self._sizes[models]
+        cos, sin = np.cos(bodies.yaws[rows]), np.sin(bodies.yaws[rows])
+        level, one = np.zeros(len(rows)), np.ones(len(rows))
+        brake = (lamps & Lamps.BRAKE) != 0
+        carried, parts = [], []
+        for places, on, aim, tint, power, strength in (
+            (self._tail, brake, (-cos, -sin, level), _BRAKE, 1.0, 6.0),
+            (self._tail, ((lamps & Lamps.TAIL) != 0) & ~brake, (-cos, -sin, level), _TAIL, 1.0, 5.0),
+            (self._head, (lamps & Lamps.HEAD) != 0, (cos, sin, level - 0.05), _HEAD, 28.0, 14.0),
+            (self._street, np.full(len(rows), streets), (level, level, -one), _STREET, 2.0, 90.0),
+        ):
+            bearers, local = places.on(models, on)
+            local = local * scale[bearers]
+            c, s = cos[bearers], sin[bearers]
+            turned = np.stack(
+                [c * local[:, 0] - s * local[:, 1], s * local[:, 0] + c * local[:, 1], local[:, 2]], axis=1
+            )
+            count = len(bearers)
+            carried.append(bearers)
+            parts.append(
+                (
+                    offset[rows[bearers]] + turned,
+                    np.stack(aim, axis=1)[bearers],
+                    np.tile(tint, (count, 1)),
+                    np.full(count, power),
+                    np.full(count, strength),
+                )
+            )
+        order = np.argsort(np.concatenate(carried), kind="stable")
+        position, direction, colour, powers, strengths = (
+            np.concatenate(kind)[order] for kind in zip(*parts, strict=True)
         )
+        return Burning(
+            position=position, direction=direction, colour=colour, power=powers, strength=strengths
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Where M models have lamps of one kind.
+
+    Attributes:
+        local: (P, 3) metres, in the model, model by model.
+        first: (M,) where each model's begin.
+        count: (M,) how many it has.
+    """
+
+    local: NDArray[np.float64]
+    first: NDArray[np.intp]
+    count: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, places: Sequence[NDArray[np.float64]]) -> _Places:
+        """Gather (n, 3) places of each model."""
+        count = np.array([len(part) for part in places], np.intp)
+        return cls(np.concatenate([np.zeros((0, 3)), *places]), np.cumsum(count) - count, count)
+
+    def on(
+        self, models: NDArray[np.int32], lit: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Return (K,) which of N bodies bears each lamp that is lit, and (K, 3) where in its model."""
+        count = np.where(lit, self.count[models], 0)
+        bearers = np.repeat(np.arange(len(models)), count)
+        within = np.arange(len(bearers)) - np.repeat(np.cumsum(count) - count, count)
+        return bearers, self.local[self.first[models[bearers]] + within]
 
 
 def lights(burning: Burning) -> Lights:

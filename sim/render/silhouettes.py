@@ -1,9 +1,9 @@
-"""Each vehicle drawn alone: how many pixels it would show if nothing stood before it.
+"""Each vehicle drawn alone: which pixels it would cover if nothing stood before it.
 
-Vehicles whose boxes in the image do not overlap share one drawing; each of them is then counted within its
-own box. Inside the frame the drawing goes through the same viewport and matrix as the picture's identities,
-so that the rasteriser covers exactly the same pixels; what lies outside the frame comes from a target three
-times as wide and high.
+Every vehicle has a plot of its own in one buffer, as large as the box that holds it in the image, and its
+fragments mark their pixels there: all vehicles are drawn at once and never hide each other. Inside the frame
+the drawing goes through the same viewport and matrix as the picture's identities, so that the rasteriser
+covers exactly the same pixels; what lies outside comes from a target three times as wide and high.
 """
 
 from __future__ import annotations
@@ -17,28 +17,17 @@ from numpy.typing import NDArray
 
 from sim.camera import Camera, Pose
 from sim.render.instances import Library, Selection
-from sim.render.types import Silhouettes
+from sim.render.types import Plots, Silhouettes
 from sim.render.view import view_matrices
 from sim.world import Bodies
 
 Ints = NDArray[np.int64]
-Mask = tuple[int, int, NDArray[np.bool_]]
+
+PLOT = np.dtype([("box", "<i4", 4), ("first", "<i4")])
+"""Where an instance marks its pixels: x0, y0, x1, y1 px in the target, and the first place in the buffer."""
 
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1])
 """The twelve edges of a box, as pairs of the corners that `Library.corners` gives."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drawing:
-    """Some of N vehicles, drawn together.
-
-    Attributes:
-        rows: (M,) which of the vehicles.
-        area: x0, y0, x1, y1 px: the part of the target that holds them all.
-    """
-
-    rows: NDArray[np.intp]
-    area: tuple[int, int, int, int]
 
 
 def image_boxes(library: Library, bodies: Bodies, selection: Selection, camera: Camera, pose: Pose) -> Ints:
@@ -69,67 +58,62 @@ def image_boxes(library: Library, bodies: Bodies, selection: Selection, camera: 
     return np.asarray(np.floor(np.clip(box, low, high)), np.int64)
 
 
-def layered(boxes: Ints, rows: NDArray[np.intp]) -> list[Drawing]:
-    """Spread boxes over as few drawings as a greedy choice finds, none overlapping within one.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawn:
+    """N vehicles that OpenGL was asked to draw.
 
-    Args:
-        boxes: (N, 4) x0, y0, x1, y1.
-        rows: (M,) those to draw.
+    Attributes:
+        ids: (N,) uint32.
+        inside: (I,) which of them were drawn in the frame.
+        outside: (O,) which of them were drawn in the extended frame.
+        plots: (I + O,) `PLOT` records, one after another in the buffer.
+        frame: Width and height.
     """
-    layers = _layers(boxes, rows)
-    drawings = []
-    for layer in range(int(layers.max(initial=-1)) + 1):
-        members = rows[layers == layer]
-        held = boxes[members]
-        area = (*held[:, :2].min(axis=0).tolist(), *held[:, 2:].max(axis=0).tolist())
-        drawings.append(Drawing(rows=members, area=area))
-    return drawings
+
+    ids: NDArray[np.uint32]
+    inside: NDArray[np.intp]
+    outside: NDArray[np.intp]
+    plots: NDArray[np.void]
+    frame: tuple[int, int]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _layers(boxes: Ints, rows: NDArray[np.intp]) -> Ints:
-    """Return (M,) the first layer in which each of the rows overlaps none of those before it."""
-    layers = np.zeros(rows.size, np.int64)
-    meets = np.zeros(rows.size, np.bool_)
-    for k in range(rows.size):
-        meets[: k + 1] = False
-        x0, y0, x1, y1 = boxes[rows[k]]
-        for other in range(k):
-            a, b, c, d = boxes[rows[other]]
-            if x0 < c and a < x1 and y0 < d and b < y1:
-                meets[layers[other]] = True
-        while meets[layers[k]]:
-            layers[k] += 1
-    return layers
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _measure(
-    picture: NDArray[np.uint16], x: int, y: int, boxes: Ints, rows: NDArray[np.intp], hole: Ints, out: Ints
-) -> None:
-    """Count each row's pixels within its box and find the tightest box around them.
+def survey(covered: NDArray[np.uint32], plots: NDArray[np.void], hole: Ints) -> Ints:
+    """Count the pixels that are marked in each plot and find the tightest box around them.
 
     Args:
-        picture: Part of the target, each pixel the row that covers it plus one.
-        x: Where the part's upper left corner lies in the target.
-        y: The same, downward.
-        boxes: (N, 4) x0, y0, x1, y1 in the target.
-        rows: (M,) those drawn.
-        hole: (4,) x0, y0, x1, y1 in the target: what lies in it does not count.
-        out: (N, 5) takes the count and x0, y0, x1, y1 in the target; no change if the count is 0.
+        covered: The buffer: 1 where marked, else 0.
+        plots: (N,) `PLOT` records.
+        hole: (4,) x0, y0, x1, y1 in the target: what lies in it does not count, and is set to 0.
+
+    Returns:
+        (N, 5) count and x0, y0, x1, y1 in the target; all 0 if the count is 0.
     """
-    for row in rows:
-        x0, y0, x1, y1 = boxes[row]
+    out = np.zeros((len(plots), 5), np.int64)
+    for k in range(len(plots)):
+        x0, y0, x1, y1 = plots[k]["box"]
         count, left, top, right, bottom = 0, x1, y1, x0, y0
         for i in range(y0, y1):
-            in_hole = hole[1] <= i < hole[3]
-            for j in range(x0, x1):
-                if picture[i - y, j - x] == row + 1 and not (in_hole and hole[0] <= j < hole[2]):
-                    count += 1
-                    left, right = min(left, j), max(right, j + 1)
-                    top, bottom = min(top, i), max(bottom, i + 1)
+            first = plots[k]["first"] + (i - y0) * (x1 - x0)
+            row = covered[first : first + x1 - x0]
+            if hole[1] <= i < hole[3]:
+                for j in range(max(hole[0], x0), min(hole[2], x1)):
+                    row[j - x0] = 0
+            marked = 0
+            for value in row:
+                marked += value
+            if marked:
+                count += marked
+                top, bottom = min(top, i), i + 1
+                start, stop = 0, x1 - x0
+                while not row[start]:
+                    start += 1
+                while not row[stop - 1]:
+                    stop -= 1
+                left, right = min(left, x0 + start), max(right, x0 + stop)
         if count:
-            out[row, 0], out[row, 1], out[row, 2], out[row, 3], out[row, 4] = count, left, top, right, bottom
+            out[k, 0], out[k, 1], out[k, 2], out[k, 3], out[k, 4] = count, left, top, right, bottom
+    return out
 
 
 class SilhouettePass:
@@ -137,31 +121,35 @@ class SilhouettePass:
 
     Args:
         ctx: The context, current.
-        array: Vertex array of the body shader that writes `INSTANCE` ids.
-        instances: Its buffer of instances.
-        commands: Buffer of draw commands.
+        shader: The program that marks plots.
+        array: Its vertex array.
+        buffers: The array's instances and `PLOT` records, and draw commands.
         size: Width and height of the frame.
     """
 
-    def __init__(self, ctx: Any, array: Any, instances: Any, commands: Any, size: tuple[int, int]) -> None:
-        self._array, self._instances, self._commands = array, instances, commands
-        self._frame = ctx.framebuffer([ctx.renderbuffer(size, 1, dtype="u2")])
-        self._wide = ctx.framebuffer([ctx.renderbuffer((3 * size[0], 3 * size[1]), 1, dtype="u2")])
+    def __init__(
+        self, ctx: Any, shader: Any, array: Any, buffers: tuple[Any, Any, Any], size: tuple[int, int]
+    ) -> None:
+        self._shader, self._array = shader, array
+        self._instances, self._plots, self._commands = buffers
+        self._frame, self._wide = (
+            ctx.framebuffer([ctx.renderbuffer(edges, 1)]) for edges in (size, (3 * size[0], 3 * size[1]))
+        )
+        self._frame.color_mask = self._wide.color_mask = False, False, False, False
+        self._covered = ctx.buffer(reserve=1 << 22, dynamic=True)
 
     def release(self) -> None:
         """Give the graphics memory back."""
         for target in (self._frame, self._wide):
             target.color_attachments[0].release()
             target.release()
+        self._covered.release()
 
-    def draw(
-        self, ctx: Any, shader: Any, library: Library, vehicles: Bodies, camera: Camera, pose: Pose
-    ) -> Silhouettes:
-        """Draw and count.
+    def draw(self, ctx: Any, library: Library, vehicles: Bodies, camera: Camera, pose: Pose) -> Drawn:
+        """Ask OpenGL to draw; `count` waits until it has.
 
         Args:
             ctx: The context, current.
-            shader: The program of the array.
             library: The meshes.
             vehicles: Those to count.
             camera: The intrinsics.
@@ -173,64 +161,80 @@ class SilhouettePass:
         kept = (boxes[:, 0] < boxes[:, 2]) & (boxes[:, 1] < boxes[:, 3])
         selection = Selection(rows=selection.rows[kept], meshes=selection.meshes[kept])
         boxes = boxes[kept]
-        count = len(selection)
-        instances = library.instances(vehicles, selection, pose)
-        instances["id"] = np.arange(1, count + 1)
-        low, high = np.array([0, 0, 0, 0]), np.array([width, height, width, height])
-        inner = np.clip(boxes, low, high)
-        inside = np.flatnonzero((inner[:, 0] < inner[:, 2]) & (inner[:, 1] < inner[:, 3]))
-        outside = np.flatnonzero((boxes != inner).any(axis=1))
-        shift = np.array([width, height, width, height])
-        jobs = [(self._frame, camera, inner, drawing) for drawing in layered(inner, inside)]
+        inner = np.clip(boxes, 0, [width, height, width, height])
+        by_mesh = np.argsort(selection.meshes, kind="stable")  # equal ones in a row are one draw
+        inside = by_mesh[((inner[:, 0] < inner[:, 2]) & (inner[:, 1] < inner[:, 3]))[by_mesh]]
+        outside = by_mesh[(boxes != inner).any(axis=1)[by_mesh]]
         wide = replace(
             camera, width=3 * width, height=3 * height, cx=camera.cx + width, cy=camera.cy + height
         )
-        # To the left and to the right apart: between them lies the frame, which nobody asks for here.
-        left = boxes[outside, 0] + boxes[outside, 2] < width
-        for side in (outside[left], outside[~left]):
-            jobs += [(self._wide, wide, boxes + shift, drawing) for drawing in layered(boxes + shift, side)]
-        within, beyond = np.zeros((count, 5), np.int64), np.zeros((count, 5), np.int64)
-        if not jobs:
-            return _counted(vehicles.ids[selection.rows], within, beyond, {})
-        order = np.concatenate([drawing.rows for *_, drawing in jobs])
-        self._instances.write(instances[order])
-        self._commands.write(library.single_commands(selection.meshes[order]))
-        first = 0
-        masks: dict[int, Mask] = {}
+        plots = laid_out(np.concatenate([inner[inside], boxes[outside] + [width, height, width, height]]))
+        self._instances.write(library.instances(vehicles, selection, pose)[np.concatenate([inside, outside])])
+        self._plots.write(plots)
+        self._clear(ctx, 4 * _room(plots))
         ctx.enable_only(ctx.CULL_FACE)
         ctx.front_face = "cw"
-        current = None
-        for target, view, held, drawing in jobs:
-            if target is not current:
-                target.use()
-                shader["u_clip"].write(view_matrices(view, pose)["u_clip"])
-                current = target
-            x0, y0, x1, y1 = drawing.area
-            area = (x0, y0, x1 - x0, y1 - y0)
-            target.clear(viewport=area)
-            ctx.scissor = area
-            self._array.render_indirect(self._commands, count=len(drawing.rows), first=first)
-            first += len(drawing.rows)
-            ctx.scissor = None
-            raw = target.read(viewport=area, components=1, dtype="u2", alignment=1)
-            picture = np.frombuffer(raw, np.uint16).reshape(y1 - y0, x1 - x0)
-            if target is not self._frame:
-                hole = np.array([width, height, 2 * width, 2 * height])
-                _measure(picture, x0, y0, held, drawing.rows, hole, beyond)
-                continue
-            _measure(picture, x0, y0, held, drawing.rows, np.zeros(4, np.int64), within)
-            for row, (pixels, a, b, c, d) in zip(
-                drawing.rows.tolist(), within[drawing.rows].tolist(), strict=True
-            ):
-                if pixels:
-                    masks[row] = (b, a, picture[b - y0 : d - y0, a - x0 : c - x0] == row + 1)
-        beyond[:, 1:] -= shift[[0, 1, 0, 1]]
-        return _counted(vehicles.ids[selection.rows], within, beyond, masks)
+        for target, view, first, rows in (
+            (self._frame, camera, 0, inside),
+            (self._wide, wide, len(inside), outside),
+        ):
+            commands = library.commands(selection.meshes[rows])
+            commands["base_instance"] += first
+            self._commands.write(commands)
+            target.use()
+            self._shader["u_clip"].write(view_matrices(view, pose)["u_clip"])
+            self._array.render_indirect(self._commands, count=len(commands))
+        return Drawn(
+            ids=vehicles.ids[selection.rows],
+            inside=inside,
+            outside=outside,
+            plots=plots,
+            frame=(width, height),
+        )
+
+    def count(self, ctx: Any, drawn: Drawn) -> Silhouettes:
+        """Count what `draw` has drawn last."""
+        covered = np.empty(_room(drawn.plots), np.uint32)
+        ctx.memory_barrier()
+        self._covered.read_into(covered, covered.nbytes)
+        count, (width, height) = len(drawn.inside), drawn.frame
+        within, beyond = np.zeros((2, len(drawn.ids), 5), np.int64)
+        within[drawn.inside] = survey(covered, drawn.plots[:count], np.zeros(4, np.int64))
+        frame = np.array([width, height, 2 * width, 2 * height])
+        beyond[drawn.outside] = survey(covered, drawn.plots[count:], frame)
+        beyond[:, 1:] -= [width, height, width, height]
+        own = np.zeros(len(drawn.ids), PLOT)
+        own[drawn.inside] = drawn.plots[:count]
+        return _joined(drawn.ids, within, beyond, Plots(own["box"], own["first"], covered))
+
+    def _clear(self, ctx: Any, size: int) -> None:
+        """Make room for ``size`` bytes of plots, all 0, and let the shader mark them."""
+        if size > self._covered.size:
+            self._covered.release()
+            self._covered = ctx.buffer(reserve=2 * size, dynamic=True)
+        self._covered.clear(size)
+        self._covered.bind_to_storage_buffer(0)
 
 
-def _counted(ids: NDArray[np.uint32], within: Ints, beyond: Ints, masks: dict[int, Mask]) -> Silhouettes:
-    """Put together what was counted inside the frame and beyond it, (N, 5) each as `_measure` gives it."""
-    nothing: Mask = (0, 0, np.zeros((0, 0), bool))
+def laid_out(boxes: Ints) -> NDArray[np.void]:
+    """Return (N,) `PLOT` records that lay (N, 4) boxes one after another in the buffer."""
+    out = np.zeros(len(boxes), PLOT)
+    out["box"] = boxes
+    sizes = (boxes[:, 2] - boxes[:, 0]) * (boxes[:, 3] - boxes[:, 1])
+    out["first"] = np.cumsum(sizes) - sizes
+    return out
+
+
+def _room(plots: NDArray[np.void]) -> int:
+    """Places that plots take in the buffer."""
+    if not len(plots):
+        return 1
+    x0, y0, x1, y1 = plots["box"][-1]
+    return int(plots["first"][-1] + (x1 - x0) * (y1 - y0))
+
+
+def _joined(ids: NDArray[np.uint32], within: Ints, beyond: Ints, plots: Plots) -> Silhouettes:
+    """Put together what was counted inside the frame and beyond it, (N, 5) each as `survey` gives it."""
     both = np.stack([within, beyond])
     empty = both[..., :1] == 0
     low = np.where(empty, np.inf, both[..., 1:3]).min(axis=0)
@@ -238,9 +242,5 @@ def _counted(ids: NDArray[np.uint32], within: Ints, beyond: Ints, masks: dict[in
     boxes = np.concatenate([low, high], axis=1)
     boxes[np.isinf(low[:, 0])] = np.nan
     return Silhouettes(
-        ids=ids,
-        pixels=within[:, 0],
-        pixels_full=both[..., 0].sum(axis=0),
-        boxes=boxes,
-        masks=tuple(masks.get(row, nothing) for row in range(len(ids))),
+        ids=ids, pixels=within[:, 0], pixels_full=both[..., 0].sum(axis=0), boxes=boxes, plots=plots
     )

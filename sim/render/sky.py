@@ -67,3 +67,11 @@ def panorama(light: Light) -> NDArray[np.uint8]:
     out = np.full((_HEIGHT, _WIDTH, 4), 255, np.uint8)
     out[..., :3] = np.clip(shown, 0, 1) * 255 + 0.5
     return out
+
+
+def screen_grid(columns: int = 16, rows: int = 12) -> NDArray[np.float32]:
+    """Return (6 * columns * rows, 2) corners of the triangles of a grid over clip space."""
+    x, y = np.linspace(-1, 1, columns + 1), np.linspace(-1, 1, rows + 1)
+    corners = np.stack(np.meshgrid(x, y), axis=-1)
+    a, b, c, d = corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]
+    return np.stack([a, b, c, c, b, d], axis=2).reshape(-1, 2).astype(np.float32)

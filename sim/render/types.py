@@ -43,6 +43,28 @@ class Picture:
     depth: NDArray[np.float32]
 
 
+@dataclass(frozen=True, slots=True)
+class Plots:
+    """Which pixels each of N vehicles covers, row after row of a box that holds them.
+
+    Attributes:
+        boxes: (N, 4) int, x0, y0, x1, y1 px inside the frame.
+        first: (N,) int, where in ``covered`` each one's pixels begin.
+        covered: (P,) uint32, 1 where covered, else 0; there may be more than the N boxes hold.
+    """
+
+    boxes: NDArray[np.int32]
+    first: NDArray[np.int32]
+    covered: NDArray[np.uint32]
+
+    def mask(self, k: int) -> NDArray[np.bool_]:
+        """Return (h, w) what the vehicle ``k`` covers of its box."""
+        x0, y0, x1, y1 = self.boxes[k].tolist()
+        first = int(self.first[k])
+        pixels = self.covered[first : first + (x1 - x0) * (y1 - y0)]
+        return np.asarray(pixels.reshape(y1 - y0, x1 - x0) != 0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Silhouettes:
     """Each of N vehicles drawn alone (amodal truth).
@@ -52,13 +74,11 @@ class Silhouettes:
         pixels: (N,) int64, pixels inside the frame.
         pixels_full: (N,) int64, pixels inside the frame extended by its width and height on every side.
         boxes: (N, 4) float64 x0, y0, x1, y1 of the extended silhouette, px; not a number if empty.
-        masks: N times (row, column, (h, w) bool): the part of the silhouette inside the frame, and where the
-            mask's upper left corner lies in it; the array may be (0, 0). Truth needs them to tell who hides
-            whom. None where the renderer gives none: occluders are unknown then.
+        plots: The parts inside the frame: truth needs them to tell who hides whom.
     """
 
     ids: NDArray[np.uint32]
     pixels: NDArray[np.int64]
     pixels_full: NDArray[np.int64]
     boxes: NDArray[np.float64]
-    masks: tuple[tuple[int, int, NDArray[np.bool_]], ...] | None = None
+    plots: Plots

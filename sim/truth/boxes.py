@@ -34,6 +34,7 @@ def frame_truth(
         raise ValueError(f"the id map is {picture.ids.shape}, the camera {(camera.height, camera.width)}")
     bodies = state.vehicles.take(_rows(state.vehicles.ids, silhouettes.ids))
     visible_px, box_visible = visible_parts(picture.ids, silhouettes.ids)
+    plots = silhouettes.plots
     corners = pose.to_camera(_box_corners(bodies))
     ego_velocity = np.zeros(3)
     if state.ego is not None:
@@ -48,7 +49,14 @@ def frame_truth(
         amodal_px_full=silhouettes.pixels_full,
         box_visible=box_visible,
         box_amodal=silhouettes.boxes,
-        occluder_ids=_occluders(picture.ids, silhouettes, visible_px),
+        occluder_ids=_occluders(
+            picture.ids,
+            silhouettes.ids,
+            visible_px < silhouettes.pixels,
+            plots.boxes,
+            plots.first,
+            plots.covered,
+        ),
         distances=corners[..., 2].min(axis=1),
         positions=corners.mean(axis=1),
         velocities=(bodies.velocities - ego_velocity) @ pose.rotation.T,
@@ -103,51 +111,55 @@ def _scan(
     return counts, boxes
 
 
-def _occluders(
-    id_map: NDArray[np.uint32], silhouettes: Silhouettes, visible_px: NDArray[np.int64]
-) -> NDArray[np.uint32]:
-    """Find (N,) ids of what covers most of each silhouette, 0 where nothing does."""
-    occluders = np.zeros(len(silhouettes.ids), np.uint32)
-    if silhouettes.masks is None:
-        return occluders
-    for k in np.flatnonzero(visible_px < silhouettes.pixels):
-        row, column, mask = silhouettes.masks[k]
-        height, width = mask.shape
-        window = id_map[row : row + height, column : column + width]
-        occluders[k] = _most_frequent_other(window, mask, silhouettes.ids[k])
-    return occluders
-
-
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _most_frequent_other(window: NDArray[np.uint32], mask: NDArray[np.bool_], own: int) -> int:
-    """Return the id most frequent under the mask but ``own`` and the sky; of equals the lowest; or 0."""
+def _occluders(
+    id_map: NDArray[np.uint32],
+    ids: NDArray[np.uint32],
+    hidden: NDArray[np.bool_],
+    boxes: NDArray[np.int32],
+    first: NDArray[np.int32],
+    covered: NDArray[np.uint32],
+) -> NDArray[np.uint32]:
+    """Find the id most frequent under each silhouette but its own and the sky; of equals the lowest; or 0.
+
+    Args:
+        id_map: (H, W).
+        ids: (N,).
+        hidden: (N,) whether anything of it is hidden: the others are not looked at.
+        boxes: (N, 4), as in `Plots`.
+        first: (N,) likewise.
+        covered: (P,) likewise.
+    """
+    out = np.zeros(len(ids), np.uint32)
     found = np.zeros(16, np.uint32)
     counts = np.zeros(16, np.int64)
-    size, last = 0, 0
-    for row in range(mask.shape[0]):
-        for column in range(mask.shape[1]):
-            if not mask[row, column]:
-                continue
-            value = window[row, column]
-            if value == own or value == SKY_ID:  # noqa: SIM109 (numba takes no tuple of two types)
-                continue
-            # Few things hide one vehicle, and neighbours are mostly of the same one.
-            if size == 0 or found[last] != value:
-                last = 0
-                while last < size and found[last] != value:
-                    last += 1
-                if last == size:
-                    if size == len(found):
-                        found = np.concatenate((found, np.zeros_like(found)))
-                        counts = np.concatenate((counts, np.zeros_like(counts)))
-                    found[size] = value
-                    size += 1
-            counts[last] += 1
-    best = 0
-    for k in range(1, size):
-        if counts[k] > counts[best] or (counts[k] == counts[best] and found[k] < found[best]):
-            best = k
-    return found[best] if size else 0
+    for k in np.flatnonzero(hidden):
+        x0, y0, x1, y1 = boxes[k]
+        own, size, last = ids[k], 0, 0
+        for row in range(y0, y1):
+            start = first[k] + (row - y0) * (x1 - x0)
+            for value, inside in zip(id_map[row, x0:x1], covered[start : start + x1 - x0]):  # noqa: B905
+                if not inside or value == own or value == SKY_ID:  # noqa: SIM109 (numba takes no tuple of two types)
+                    continue
+                # Few things hide one vehicle, and neighbours are mostly of the same one.
+                if size == 0 or found[last] != value:
+                    last = 0
+                    while last < size and found[last] != value:
+                        last += 1
+                    if last == size:
+                        if size == len(found):
+                            found = np.concatenate((found, np.zeros_like(found)))
+                            counts = np.concatenate((counts, np.zeros_like(counts)))
+                        found[size], counts[size] = value, 0
+                        size += 1
+                counts[last] += 1
+        best = 0
+        for n in range(1, size):
+            if counts[n] > counts[best] or (counts[n] == counts[best] and found[n] < found[best]):
+                best = n
+        if size:
+            out[k] = found[best]
+    return out
 
 
 def _rows(ids: NDArray[np.uint32], wanted: NDArray[np.uint32]) -> NDArray[np.intp]:

@@ -15,9 +15,11 @@ import numpy as np
 from sim.params import RoadParams
 from sim.rng import stream
 from sim.roads import InCarRoad, build_road
+from tests.benchmarks.lines import Line, table
 
 RATE = 30
-COUNTS = (20, 50, 100)
+LEAST = {20: None, 50: None, 100: 4.0}
+"""Vehicles, and how many times as fast the indexed road should be with them."""
 REPEATS = 5
 TICKS = 10
 METRES_PER_VEHICLE = 11.0
@@ -97,14 +99,18 @@ def measure(count: int) -> tuple[float, float]:
     return stock, indexed
 
 
-def main() -> None:
-    """Print the table."""
+def main() -> list[Line]:
+    """Print the table, and return its ratios."""
     print("traffic: stock highway-env against the indexed road, ms a tick (equal trajectories)")
     print(f"{'vehicles':>9} {'stock':>9} {'indexed':>9} {'ratio':>7}")
-    for count in COUNTS:
+    lines = []
+    for count, least in LEAST.items():
         stock, indexed = measure(count)
-        print(f"{count:>9} {stock:>9.2f} {indexed:>9.2f} {stock / indexed:>7.1f}")
+        print(f"{count:>9} {stock:>9.2f} {indexed:>9.2f} {stock / indexed:>7.1f}", flush=True)
+        what = f"highway-env / indexed traffic, {count} vehicles"
+        lines.append(Line(what=what, measured=stock / indexed, least=least))
+    return lines
 
 
 if __name__ == "__main__":
-    main()
+    print(table(main()))

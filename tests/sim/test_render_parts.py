@@ -1,40 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from sim.camera import Pose
-from sim.render.antialias import smooth_edges
+from sim.models import Surface
 from sim.render.ground import cut, fractal, mark_table
 from sim.render.instances import Library, in_bands
-from sim.render.lamps import LIGHTS, LampPlan, halos, lights
+from sim.render.lamps import LIGHTS, LampPlan, _centres, halos, lights
 from sim.rng import stream
 from sim.world import FIRST_VEHICLE_ID, Lamps
 from tests.sim.toy_stage import CAMERA, MODELS, POSE, bodies, ground, stage, state
-
-
-def edge(shape: tuple[int, int], slope: float, step: float, samples: int) -> np.ndarray:
-    """Sample a slanted edge: dark below, bright above."""
-    fine = (np.arange(samples) + 0.5) / samples
-    y = (np.arange(shape[0])[:, None] + fine).ravel()
-    x = (np.arange(shape[1])[:, None] + fine).ravel()
-    inside = (y[:, None] < step + slope * x[None]).reshape(shape[0], samples, shape[1], samples)
-    return 40 + 170 * inside.mean(axis=(1, 3))
-
-
-@pytest.mark.parametrize("slope", [0.05, 0.11, 0.3, -0.2])
-def test_smoothed_stairs_are_nearer_to_the_true_edge(slope):
-    shape = (48, 64)
-    stairs, truth = edge(shape, slope, 20.3, 1), edge(shape, slope, 20.3, 16)
-    rgba = np.repeat(np.round(stairs).astype(np.uint8)[..., None], 4, axis=-1)
-    smooth = smooth_edges(rgba)[..., 0].astype(float)
-    before = np.abs(stairs - truth)[4:-4, 16:-16].sum()
-    after = np.abs(smooth - truth)[4:-4, 16:-16].sum()
-    assert after < 0.6 * before
-
-
-def test_flat_parts_and_levels_are_left_alone():
-    rgba = np.full((20, 30, 4), 90, np.uint8)
-    rgba[10:] = 180
-    np.testing.assert_array_equal(smooth_edges(rgba), rgba[..., :3])
 
 
 def test_stretches_hold_every_face_once_and_in_place():
@@ -133,3 +109,35 @@ def test_dark_cars_have_no_lamps_and_the_list_of_lights_is_full_of_nothing():
     assert shining.position.shape == (LIGHTS, 3)
     assert not shining.colour.any()
     assert len(halos(burning, CAMERA, night=True)) == 0
+
+
+def test_every_lamp_that_is_on_is_found_body_by_body():
+    plan, rng = LampPlan(MODELS), np.random.default_rng(0)
+    rows = [(0, x, y, yaw) for x, y, yaw in rng.uniform([-30, -10, -3], [300, 10, 3], (40, 3))]
+    cars = bodies(rows, FIRST_VEHICLE_ID)
+    cars = replace(cars, lamps=rng.integers(0, 8, 40).astype(np.uint8), sizes=cars.sizes * 1.1)
+    found = plan.burning(cars, CAMERA, POSE, streets=False)
+    position, direction, power, strength = [], [], [], []
+    for k in range(40):
+        ahead = (cars.positions[k] - POSE.position) @ POSE.rotation[2]
+        if not -20 < ahead < 0.5 * CAMERA.far:
+            continue
+        lamps, cos, sin = int(cars.lamps[k]), np.cos(cars.yaws[k]), np.sin(cars.yaws[k])
+        turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+        shown = []
+        if lamps & (Lamps.TAIL | Lamps.BRAKE):
+            braking = bool(lamps & Lamps.BRAKE)
+            shown.append((Surface.TAIL_LAMP, [-cos, -sin, 0], 1.0, 6.0 if braking else 5.0))
+        if lamps & Lamps.HEAD:
+            shown.append((Surface.HEAD_LAMP, [cos, sin, -0.05], 28.0, 14.0))
+        for surface, aim, sharpness, reach in shown:
+            for place in _centres(MODELS[0], surface):
+                scale = cars.sizes[k] / MODELS[0].size
+                position.append(cars.positions[k] - POSE.position + turn @ (place * scale))
+                direction.append(aim)
+                power.append(sharpness)
+                strength.append(reach)
+    np.testing.assert_allclose(found.position, position)
+    np.testing.assert_allclose(found.direction, direction)
+    np.testing.assert_array_equal(found.power, power)
+    np.testing.assert_array_equal(found.strength, strength)

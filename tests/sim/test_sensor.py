@@ -2,11 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from sim.camera import Camera
 from sim.params import SensorParams
 from sim.render.types import Picture
-from sim.sensor import Sensor, falloff, noise_amplitude, noise_tile
+from sim.sensor import Sensor, _develop, falloff, noise_amplitude, noise_tile
 from tests.sim.toy_stage import light
 
 CAMERA = Camera(width=320, height=240, focal=400.0, cx=160.0, cy=120.0)
@@ -110,3 +112,24 @@ def test_bright_lamps_glare_at_night():
     picture.colour[108:120, 146:158] = 255
     image = sensor(CLEAN, night=True).expose(picture, 0, 0.0)
     assert int(image[113, 164, 0]) > int(image[20, 20, 0]) + 3
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), gain=st.floats(0.5, 2.0), noise=st.floats(0.0, 20.0))
+def test_developing_is_what_numpy_says_pixel_by_pixel(seed, gain, noise):
+    rng = np.random.default_rng(seed)
+    rows, columns = 7, 37
+    image = rng.integers(0, 256, (3, rows, columns)).astype(np.uint8)
+    lens = rng.uniform(0.6, 1.0, (rows, columns)).astype(np.float32)
+    tile = rng.standard_normal((rows + 9, columns + 9)).astype(np.float32)
+    shifts, amplitude = rng.integers(0, 9, (4, 2)), noise_amplitude(noise)
+    out = np.empty_like(image)
+    _develop(image, lens, gain, tile, shifts, amplitude, out)
+
+    one, windows = np.float32(1), [tile[a : a + rows, b : b + columns] for a, b in shifts]
+    red, green, blue = np.float32(gain) * lens * image
+    grey = np.minimum((red + green + green + blue) * np.float32(0.25), 255).astype(int)
+    common = np.float32(0.5) + amplitude[grey] * np.float32(0.8) * windows[0]
+    for plane, found, window in zip((red, green, blue), out, windows[1:], strict=True):
+        wanted = np.minimum(plane, 255 * one) + common + amplitude[grey] * np.float32(0.6) * window
+        np.testing.assert_array_equal(found, np.clip(wanted, 0, 255).astype(np.uint8))

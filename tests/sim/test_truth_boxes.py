@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from sim.camera import Camera, Pose
-from sim.render.types import Picture, Silhouettes
+from sim.render.types import Picture, Plots, Silhouettes
 from sim.truth.boxes import frame_truth, visible_parts
 from sim.truth.types import FrameTruth
 from sim.world import Bodies, Ego, Kind, Role, WorldState
@@ -53,23 +53,30 @@ def picture_of(ids: np.ndarray) -> Picture:
 def silhouettes_of(alone: dict[int, np.ndarray], extra: dict[int, int] | None = None) -> Silhouettes:
     """Silhouettes of in-frame masks; ``extra`` adds pixels to the right of the frame, in one row."""
     extra = extra or {}
-    boxes, masks = [], []
+    boxes, parts = [], []
     for number, mask in alone.items():
         rows, columns = np.nonzero(mask)
         if len(rows) == 0:
             boxes.append([np.nan] * 4)
-            masks.append((0, 0, np.zeros((0, 0), bool)))
+            parts.append(np.zeros((0, 0), bool))
             continue
         y0, y1, x0, x1 = rows.min(), rows.max() + 1, columns.min(), columns.max() + 1
         boxes.append([x0, y0, x1 + extra.get(number, 0), y1])
-        masks.append((int(y0), int(x0), mask[y0:y1, x0:x1]))
+        parts.append(mask[y0:y1, x0:x1])
     pixels = np.array([int(mask.sum()) for mask in alone.values()], np.int64)
+    held = np.array(boxes, float).reshape(-1, 4)
+    inside = held - np.array([[0, 0, extra.get(number, 0), 0] for number in alone]).reshape(-1, 4)
+    sizes = np.array([part.size for part in parts], int)
     return Silhouettes(
         ids=np.array(list(alone), np.uint32),
         pixels=pixels,
         pixels_full=pixels + np.array([extra.get(number, 0) for number in alone], np.int64),
-        boxes=np.array(boxes, float).reshape(-1, 4),
-        masks=tuple(masks),
+        boxes=held,
+        plots=Plots(
+            np.nan_to_num(inside).astype(np.int32),
+            (np.cumsum(sizes) - sizes).astype(np.int32),
+            np.concatenate([np.zeros(0), *(part.ravel() for part in parts)]).astype(np.uint32),
+        ),
     )
 
 

@@ -11,12 +11,15 @@ vec3 turned(vec3 v) {
 }
 
 #ifdef ALONE
-in uint i_id;
-flat out uint v_id;
+in ivec4 i_box;
+in int i_first;
+flat out ivec4 v_box;
+flat out int v_first;
 
 void main() {
     gl_Position = u_clip * vec4(i_position + turned(in_position * i_scale), 1.0);
-    v_id = i_id;
+    v_box = i_box;
+    v_first = i_first;
 }
 #endif
 
