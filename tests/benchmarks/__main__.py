@@ -1,8 +1,8 @@
 """All benchmarks: ``python -m tests.benchmarks``. Each prints ratios measured in one run."""
 
-from tests.benchmarks import episode, render, tracker, traffic
+from tests.benchmarks import episode, jpda, render, tracker, traffic
 
 if __name__ == "__main__":
-    for benchmark in (traffic, render, tracker, episode):
+    for benchmark in (traffic, render, tracker, jpda, episode):
         print(f"\n## {benchmark.__name__.rsplit('.', 1)[-1]}")
         benchmark.main()

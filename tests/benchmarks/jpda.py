@@ -28,7 +28,7 @@ def dense(targets: int, measured: int, seed: int = 0) -> Floats:
 
 
 def lane(targets: int, seed: int) -> Floats:
-    """Draw weights of riders in a lane: as many as in a dense stream, one measurement each, little clutter."""
+    """Draw weights of riders in a lane: a stream of them, one measurement each, little clutter."""
     rng = np.random.default_rng(seed)
     places = np.stack([rng.uniform(0, 100.0, targets), rng.uniform(0, 20.0 * targets, targets)], 1)
     mean = np.insert(places, [1, 2], 0.0, axis=1)
@@ -64,7 +64,7 @@ def main() -> None:
         if EHM2 is None:
             continue
         began = time.thread_time()
-        theirs = EHM2.run(np.ones(weights.shape, int), weights)
+        theirs = EHM2().run(np.ones(weights.shape, int), weights)
         taken = time.thread_time() - began
         error = np.abs(theirs - jpda.associate(weights).beta).max()
         print(f"  EHM2 {taken * 1e3:.0f} ms: {taken / ours:.0f} times ours; largest difference {error:.1e}")

@@ -1,4 +1,4 @@
-"""Joint probabilistic data association: gates, clusters, association probabilities, moments (paper 3, section III).
+"""Joint probabilistic data association: gates, clusters, probabilities, moments (paper 3, section III).
 
 Paper 3's eqs. (19)-(27) with the factors that its prose lacks (Bar-Shalom, Daum, Huang, IEEE Control Systems
 29(6), 2009): of Poisson clutter with density lambda, an association event weighs the product of
@@ -77,8 +77,8 @@ def gate_distance(probability: float, dimensions: int = 2) -> float:
 def likelihoods(found: Innovations, *, detection: ArrayLike, gate: float, clutter: ArrayLike) -> Floats:
     """Weigh each target's choices: column 0 is a miss, column j measurement j - 1.
 
-    What else tells whether a measurement is the target's, such as colour, enters as a likelihood ratio against
-    clutter: multiply the columns from 1 by it.
+    What else tells whether a measurement is the target's, such as colour, enters as a likelihood ratio
+    against clutter: multiply the columns from 1 by it.
 
     Args:
         found: Residuals of N targets and M measurements.
@@ -104,8 +104,8 @@ class Association:
     """How N targets and M measurements belong together.
 
     Attributes:
-        beta: (N, M + 1) probability that a target was missed (column 0) or caused measurement j - 1; eq. (26).
-        clusters: (N,) int64 number of the cluster: targets that share measurements, directly or through others.
+        beta: (N, M + 1) probability that a target was missed (column 0) or caused measurement j - 1, eq. (26).
+        clusters: (N,) int64 number of the cluster: targets that share measurements, also through others.
         approximate: (N,) bool, whether the target's cluster was beyond the budget and its probabilities come
             from belief propagation.
     """

@@ -1,11 +1,11 @@
 """Marginals of random matchings: how probable each pair of a row and a column is, exactly.
 
-A matching pairs some rows with some columns, none twice; its weight is the product of its pairs' odds. The sum
-over all matchings is of the permanent's kind, so the rows are taken one after another and only the set of used
-columns is remembered, and of that only the columns that earlier rows have wanted and later ones still want:
-what EHM does with its nodes (Maskell, Briers, Wright, 2004). The state is a bit mask; a column's bit is free
-again after the last row that wants it, so a long chain of neighbours costs as little as its widest place.
-Rows and columns may change places, whichever is cheaper.
+A matching pairs some rows with some columns, none twice; its weight is the product of its pairs' odds. The
+sum over all matchings is of the permanent's kind, so the rows are taken one after another and only the set of
+used columns is remembered, and of that only the columns that earlier rows have wanted and later ones still
+want: what EHM does with its nodes (Maskell, Briers, Wright, 2004). The state is a bit mask; a column's bit is
+free again after the last row that wants it, so a long chain of neighbours costs as little as its widest
+place. Rows and columns may change places, whichever is cheaper.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ def components(wanted):  # type: ignore[no-untyped-def]
         wanted: (N, M) bool.
 
     Returns:
-        (N,) and (M,) int64, the component of each row and column, from 0 in the order of the rows; columns that
-        no row wants have -1.
+        (N,) and (M,) int64, the component of each row and column, from 0 in the order of the rows; columns
+        that no row wants have -1.
     """
     rows, columns = wanted.shape
     of_row, of_column = np.full(rows, -1, np.int64), np.full(columns, -1, np.int64)
@@ -104,8 +104,8 @@ def marginals(odds, order, bits, last, widths):  # type: ignore[no-untyped-def]
     """Sum over all matchings after a plan, forward and backward.
 
     Args:
-        odds: (R, C) float64, the weight of each pair against both staying alone, >= 0; up to about 1e15, beyond
-            which products may leave the range of float64.
+        odds: (R, C) float64, the weight of each pair against both staying alone, >= 0; up to about 1e15,
+            beyond which products may leave the range of float64.
         order: (R,) as from `plan`, like the rest.
         bits: (C,)
         last: (C,)

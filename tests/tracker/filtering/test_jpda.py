@@ -20,7 +20,7 @@ EXACT = {"rtol": 0, "atol": 1e-12}
 
 def events(weights):
     """All joint events: for each target the chosen column, none but the miss twice; and their weights."""
-    rows, columns = weights.shape
+    rows = len(weights)
     found = []
     for chosen in itertools.product(*(np.flatnonzero(weights[i]) for i in range(rows))):
         taken = [j for j in chosen if j]
@@ -224,7 +224,9 @@ def test_weights_that_cannot_be():
 def test_colour_and_detection_by_target():
     """One P_D for each target and one clutter density for each measurement are their rows and columns."""
     _, _, found, _ = case()
-    weights = jpda.likelihoods(found, detection=[0.9, 0.5, 0.9], gate=0.99, clutter=[1e-4, 1e-4, 1e-4, 2e-4, 1])
+    weights = jpda.likelihoods(
+        found, detection=[0.9, 0.5, 0.9], gate=0.99, clutter=[1e-4, 1e-4, 1e-4, 2e-4, 1]
+    )
     assert np.allclose(weights[:, 0], [0.109, 0.505, 0.109])
     assert np.isclose(weights[1, 2], 0.5 * found.densities[1, 1] / 1e-4)
     assert np.isclose(weights[2, 4], 0.9 * found.densities[2, 3] / 2e-4)
@@ -266,9 +268,7 @@ def test_error_is_what_the_covariance_says(detection, clutter):
         for i in range(RUNS):
             measured = np.concatenate([own[i : i + 1][~np.isnan(own[i : i + 1, 0])], false[i]])
             one = slice(i, i + 1)
-            found = jpda.innovations(
-                mean[one], covariance[one], measured, planar.POSITION, NOISE * np.eye(2)
-            )
+            found = jpda.innovations(mean[one], covariance[one], measured, planar.POSITION, NOISE * np.eye(2))
             weights = jpda.likelihoods(
                 found, detection=min(detection, 0.99999), gate=gate, clutter=max(clutter, 1e-12)
             )
