@@ -2,7 +2,7 @@
 
 ``python -m tests.validation.jpda_experiment --out plot.png`` prints the numbers and draws the tracks of one
 seed. Targets start in [0, 500] x [0, 50], false alarms fall in [0, 200] x [0, 200], P_D = .98, as printed;
-the paper does not say how fast the targets go, how much is false and how exact a measurement is: see `Setting`.
+the paper does not say how fast targets go, how much is false and how exact a measurement is: see `Setting`.
 Our form is beside the printed one, eqs. (28)-(29), which always moves a target to some measurement.
 """
 

@@ -104,7 +104,7 @@ class Association:
     """How N targets and M measurements belong together.
 
     Attributes:
-        beta: (N, M + 1) probability that a target was missed (column 0) or caused measurement j - 1, eq. (26).
+        beta: (N, M + 1) probability that a target was missed (column 0) or caused measurement j - 1, (26).
         clusters: (N,) int64 number of the cluster: targets that share measurements, also through others.
         approximate: (N,) bool, whether the target's cluster was beyond the budget and its probabilities come
             from belief propagation.

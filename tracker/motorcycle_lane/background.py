@@ -1,0 +1,330 @@
+"""Statistical background model: Li, Huang, Gu, Tian, TIP 13(11), 2004; eqs. (1)-(18) of paper 3.
+
+Each pixel learns how often it shows which colour, gradient and pair of successive colours, and how often as
+background. A pixel that differs neither from the background image nor from the frame before is background;
+one that keeps still is judged by colour and gradient, eq. (7), one that moves by its pair of colours, eq. (4).
+What stays for long becomes background at once, eqs. (12)-(14).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker.motorcycle_lane.change import corner, differences
+from tracker.motorcycle_lane.tables import COLOUR, GRADIENT, PAIR, Table, evidence, foreign, learn, same, turn
+
+FADED = np.float32(1e-20)
+"""A common factor that has fallen so far is taken into the tables."""
+
+
+class StatMode(StrEnum):
+    """What p(v|b) in the tables is.
+
+    Attributes:
+        JOINT: As (10) is printed it fades in every frame and becomes P(v and b): a colour is background only
+            where the background is seen more than half of the time.
+        CONDITIONAL: It fades and grows only in frames where the pixel is background: P(v|b) proper. Needed
+            where traffic is dense; what is left behind is absorbed half as fast.
+    """
+
+    JOINT = "joint"
+    CONDITIONAL = "conditional"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BackgroundParameters:
+    """Parameters of the background model.
+
+    Attributes:
+        mode: Reading of the statistics.
+        rate: alpha. Raising it absorbs stopped objects sooner and forgets rare background sooner.
+        start_rate: Highest alpha while the first frames are averaged. Raising it lets the very first frames
+            weigh more.
+        start_frames: Frames of training, in which a pixel is background if it shows its most frequent colour.
+            Raising it learns through denser traffic, and takes longer.
+        image_rate: beta of the background image. Raising it follows the light faster, and noise too.
+        colours: N, M of the colour table: entries used, and kept. Raising them holds rarer background.
+        gradients: N, M of the gradient table.
+        pairs: N, M of the table of colour pairs.
+        tolerance: delta of eq. (8), for colours and gradients. Raising it takes larger changes of brightness
+            for the same feature, and pale objects for background.
+        colour_floor: Distance of two colours, grey levels, that is only noise. Raising it makes dark pixels
+            as tolerant as bright ones.
+        gradient_floor: tau_e: distance of two gradients, in levels of 8 Sobel units, that is only noise; two
+            or three standard deviations. Raising it ignores weak texture.
+        pair_tolerance: delta of eq. (9), of 32 levels.
+        once_off: M of eq. (13). Raising it absorbs stopped objects later.
+        least_change: Grey levels that are always noise. Raising it loses pale objects, lowering it sends
+            noisy pixels through the tables, which takes time.
+        most_change: Grey levels that never are noise.
+        flash_share: Share of foreground pixels from which the light must have changed. Raising it withstands
+            denser traffic.
+        flash_frames: Successive frames of such a share before all is learnt anew.
+    """
+
+    mode: StatMode = StatMode.CONDITIONAL
+    rate: float = 0.005
+    start_rate: float = 0.1
+    start_frames: int = 30
+    image_rate: float = 0.1
+    colours: tuple[int, int] = (15, 25)
+    gradients: tuple[int, int] = (15, 25)
+    pairs: tuple[int, int] = (25, 40)
+    tolerance: float = 0.005
+    colour_floor: float = 12.0
+    gradient_floor: float = 8.0
+    pair_tolerance: int = 2
+    once_off: float = 0.85
+    least_change: int = 10
+    most_change: int = 30
+    flash_share: float = 0.5
+    flash_frames: int = 3
+
+
+PAPER = BackgroundParameters(mode=StatMode.JOINT, colour_floor=0.0)
+"""As printed, with OpenCV's values where the paper's are lost: no tolerance of noise in dark pixels."""
+
+
+class Limits(NamedTuple):
+    """What the kernel needs of the parameters."""
+
+    conditional: bool
+    colours: int
+    gradients: int
+    pairs: int
+    tolerance: np.float32
+    colour_floor: np.float32
+    gradient_floor: np.float32
+    pair_tolerance: np.float32
+    once_off: np.float32
+    image_rate: np.float32
+
+
+class BackgroundModel:
+    """Background model of one camera.
+
+    Attributes:
+        parameters: As given.
+    """
+
+    def __init__(self, width: int, height: int, parameters: BackgroundParameters | None = None) -> None:
+        self.parameters = p = BackgroundParameters() if parameters is None else parameters
+        self._shape = height, width
+        pixels = height * width
+        self._tables = (
+            Table.empty(p.colours[1], pixels),
+            Table.empty(p.gradients[1], pixels),
+            Table.empty(p.pairs[1], pixels),
+        )
+        self._limits = Limits(
+            p.mode is StatMode.CONDITIONAL,
+            p.colours[0],
+            p.gradients[0],
+            p.pairs[0],
+            np.float32(p.tolerance),
+            np.float32(p.colour_floor),
+            np.float32(p.gradient_floor),
+            np.float32(p.pair_tolerance),
+            np.float32(p.once_off),
+            np.float32(p.image_rate),
+        )
+        self._background = np.zeros((pixels, 3), np.float32)
+        self._previous: NDArray[np.uint8] | None = None
+        # p(b) of each pixel: one for all tables, since all learn from the same frames.
+        self._p_b = np.ones(pixels, np.float32)
+        self._factor = np.float32(1.0)
+        self._factor_shared = np.ones(pixels, np.float32)
+        self._frames = 0
+        self._flashing = 0
+
+    @property
+    def background(self) -> NDArray[np.uint8]:
+        """The background image, (H, W, 3) RGB."""
+        return np.asarray(self._background.round().astype(np.uint8).reshape(*self._shape, 3))
+
+    @property
+    def training(self) -> bool:
+        """Whether the next frame belongs to the training."""
+        return self._frames < self.parameters.start_frames
+
+    def apply(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Classify and learn one frame.
+
+        Args:
+            image: (H, W, 3) uint8 RGB.
+
+        Returns:
+            (H, W) foreground, raw: see `tracker.motorcycle_lane.blobs.clean`.
+
+        Raises:
+            ValueError: If the image has another size than the model.
+        """
+        if image.shape != (*self._shape, 3):
+            raise ValueError(f"image is {image.shape}, wanted {(*self._shape, 3)}")
+        p = self.parameters
+        pixels = np.ascontiguousarray(image).reshape(-1, 3)
+        gradients = gradient(image)
+        mask = np.zeros(len(pixels), np.bool_)
+        if self._previous is None:
+            _begin(pixels, gradients, self._background, *self._tables)
+        else:
+            far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
+            rate = np.float32(max(p.rate, min(p.start_rate, 1.0 / (self._frames + 1))))
+            self._factor *= np.float32(1.0) - rate
+            foreground = _step(
+                pixels,
+                self._previous,
+                gradients,
+                far > corner(far_counts, p.least_change, p.most_change),
+                moved > corner(moved_counts, p.least_change, p.most_change),
+                self._background,
+                *self._tables,
+                self._p_b,
+                self._factor,
+                self._factor_shared,
+                rate,
+                self.training,
+                self._limits,
+                mask,
+            )
+            if self._factor < FADED:
+                self._take_in()
+            self._watch_the_light(foreground / len(pixels))
+        self._previous = pixels.copy()
+        self._frames += 1
+        return mask.reshape(self._shape)
+
+    def _watch_the_light(self, share: float) -> None:
+        """Learn anew if most of the image has been foreground for some frames: a once-off change of all."""
+        p = self.parameters
+        self._flashing = self._flashing + 1 if share > p.flash_share and not self.training else 0
+        if self._flashing == p.flash_frames:
+            self._flashing, self._frames = 0, 0
+            self._background[:] = self._previous
+
+    def _take_in(self) -> None:
+        """Multiply the tables by the common factor and begin it again."""
+        joint = self.parameters.mode is StatMode.JOINT
+        for table in self._tables:
+            table.seen[:] *= self._factor
+            if joint:
+                table.shared[:] *= self._factor
+        self._factor = np.float32(1.0)
+
+
+def gradient(image: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """Return (P,) gradients of the grey image: 256 levels each of x (low byte) and y, 128 is none."""
+    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+    along = cv2.Sobel(grey, cv2.CV_16S, 1, 0, ksize=3)
+    across = cv2.Sobel(grey, cv2.CV_16S, 0, 1, ksize=3)
+    return np.asarray((along.ravel() // 8 + 128) | (across.ravel() // 8 + 128) << 8).view(np.uint16)
+
+
+@njit(cache=True)
+def _colour(pixels, i):  # type: ignore[no-untyped-def]
+    return (np.uint32(pixels[i, 0]) << 16) | (np.uint32(pixels[i, 1]) << 8) | np.uint32(pixels[i, 2])
+
+
+@njit(cache=True)
+def _coarse(colour):  # type: ignore[no-untyped-def]
+    """Return a colour in 32 levels a channel, 15 bits."""
+    return ((colour >> 9) & 0x7C00) | ((colour >> 6) & 0x3E0) | ((colour >> 3) & 0x1F)
+
+
+@njit(cache=True)
+def _begin(pixels, gradients, background, colours, edges, pairs):  # type: ignore[no-untyped-def]
+    """Take the first frame for background, the only thing that each pixel has ever shown."""
+    for i in range(pixels.shape[0]):
+        colour = np.uint32(_colour(pixels, i))
+        features = (colour, np.uint32(gradients[i]), np.uint32((_coarse(colour) << 15) | _coarse(colour)))
+        for table, feature in zip((colours, edges, pairs), features):  # noqa: B905 - numba knows no strict
+            table.features[0, i] = feature
+            table.seen[0, i] = table.shared[0, i] = 1.0
+        for c in range(3):
+            background[i, c] = pixels[i, c]
+
+
+@njit(cache=True)
+def _step(  # type: ignore[no-untyped-def]
+    pixels,
+    previous,
+    gradients,
+    far,
+    moved,
+    background,
+    colours,
+    edges,
+    pairs,
+    p_b,
+    factor,
+    factor_shared,
+    rate,
+    training,
+    limits,
+    mask,
+):
+    """Classify all pixels and learn from them; returns how many are foreground."""
+    delta, one = limits.tolerance, np.float32(1.0)
+    floor_c, floor_e, delta_p = limits.colour_floor, limits.gradient_floor, limits.pair_tolerance
+    grow = rate / factor
+    count = 0
+    for i in range(pixels.shape[0]):
+        colour = np.uint32(_colour(pixels, i))
+        edge = np.uint32(gradients[i])
+        pair = np.uint32((_coarse(_colour(previous, i)) << 15) | _coarse(colour))
+        changed = far[i] or moved[i]
+        shared_factor = factor_shared[i] if limits.conditional else factor / (one - rate)
+        if not changed:
+            is_b = True
+        elif training:
+            is_b = same(COLOUR, colours.features[0, i], colour, delta, floor_c)
+        elif moved[i]:
+            v, vb = evidence(PAIR, pairs, i, pair, limits.pairs, delta_p, floor_c)
+            v *= factor / (one - rate)
+            vb *= shared_factor
+            is_b = 2.0 * vb * p_b[i] > v
+        else:
+            v, vb = evidence(COLOUR, colours, i, colour, limits.colours, delta, floor_c)
+            e, eb = evidence(GRADIENT, edges, i, edge, limits.gradients, delta, floor_e)
+            v *= (factor / (one - rate)) * e * (factor / (one - rate))
+            vb *= shared_factor * eb * shared_factor
+            is_b = 2.0 * vb * p_b[i] > v
+        if not changed:
+            for c in range(3):
+                background[i, c] += limits.image_rate * (np.float32(pixels[i, c]) - background[i, c])
+        elif is_b:
+            for c in range(3):
+                background[i, c] = pixels[i, c]
+        p_b[i] += rate * ((one if is_b else np.float32(0.0)) - p_b[i])
+        shared_factor = factor
+        if limits.conditional:
+            if is_b:
+                factor_shared[i] *= one - rate
+            shared_factor = factor_shared[i]
+        grow_shared = rate / shared_factor if is_b else np.float32(0.0)
+        learn(COLOUR, colours, i, colour, grow, grow_shared, delta, floor_c)
+        learn(GRADIENT, edges, i, edge, grow, grow_shared, delta, floor_e)
+        learn(PAIR, pairs, i, pair, grow, grow_shared, delta_p, floor_c)
+        if is_b:
+            if limits.conditional and shared_factor < FADED:
+                for table in (colours, edges, pairs):
+                    for k in range(table.shared.shape[0]):
+                        table.shared[k, i] *= shared_factor
+                factor_shared[i] = one
+            continue
+        mask[i] = True
+        count += 1
+        if training or foreign(colours, i, limits.colours, p_b[i], factor, shared_factor) <= limits.once_off:
+            continue
+        turn(colours, i, limits.colours, p_b[i], factor, shared_factor)
+        turn(edges, i, limits.gradients, p_b[i], factor, shared_factor)
+        turn(pairs, i, limits.pairs, p_b[i], factor, shared_factor)
+        p_b[i] = one - p_b[i]
+    return count

@@ -1,0 +1,63 @@
+"""Where a frame differs from the background and from the frame before, with thresholds found in the frame.
+
+Paper 3, section II.D.1; the threshold is the corner of the histogram of differences (Rosin, Unimodal
+thresholding, Pattern Recognition 34, 2001): nearly all pixels only carry noise, and the corner is where
+their peak ends and the tail of changed ones begins.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+
+
+@njit(cache=True)
+def differences(image, background, previous):  # type: ignore[no-untyped-def]
+    """Return the largest difference of a channel to two images, and its histograms.
+
+    Args:
+        image: (P, 3) uint8.
+        background: (P, 3) float32.
+        previous: (P, 3) uint8.
+
+    Returns:
+        (P,) uint8 to the background and to the previous frame, and (256,) int64 of each.
+    """
+    count = image.shape[0]
+    far, moved = np.empty(count, np.uint8), np.empty(count, np.uint8)
+    for i in range(count):
+        most_far, most_moved = np.float32(0.0), 0
+        for c in range(3):
+            value = np.int32(image[i, c])
+            most_far = max(most_far, abs(np.float32(value) - background[i, c]))
+            most_moved = max(most_moved, abs(value - np.int32(previous[i, c])))
+        far[i], moved[i] = np.uint8(most_far + np.float32(0.5)), np.uint8(most_moved)
+    far_counts, moved_counts = np.zeros(256, np.int64), np.zeros(256, np.int64)
+    for i in range(count):
+        far_counts[far[i]] += 1
+        moved_counts[moved[i]] += 1
+    return far, moved, far_counts, moved_counts
+
+
+def corner(counts: NDArray[np.int64], least: int, most: int) -> int:
+    """Return the largest difference that still is noise: Rosin's corner of a histogram.
+
+    The corner is the bin that lies furthest below the straight line from the peak to the last bin in use.
+
+    Args:
+        counts: (256,) histogram of differences.
+        least: Never below: compression adds errors that come and go in blocks. Raising it loses pale objects.
+        most: Never above, and no peak is looked for above: after a change of the whole light the peak itself
+            has moved. Raising it lets such a change pass as noise.
+    """
+    peak = int(np.argmax(counts[: most + 1]))
+    last = int(np.flatnonzero(counts)[-1])
+    if last <= peak:
+        return least
+    bins = np.arange(peak, last + 1)
+    drop = (counts[peak] - counts[last]) / (last - peak)
+    below = counts[peak] - drop * (bins - peak) - counts[peak : last + 1]
+    return int(np.clip(peak + np.argmax(below), least, most))

@@ -1,0 +1,153 @@
+"""Tables of statistics of one pixel's features: eqs. (5), (6), (8)-(16) of paper 3.
+
+A table holds for each pixel the features seen most often, with how often: p(v), and how often as background:
+p(v|b), sorted by p(v). Every frame all entries fade by (1 - rate) and the one seen grows by the rate. Fading
+all of them would touch the whole memory in each frame, so a common factor is kept aside instead: an entry holds
+its value divided by that factor, grows by rate / factor, and all others stay as they are. Values are the same
+up to rounding, and so is the order. The layout is plane by plane, entry 0 of all pixels first: most pixels
+need no other.
+
+Features are packed into 32 bits: three bytes of colour; two signed bytes of gradient; six times five bits of
+colour before and now.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+COLOUR, GRADIENT, PAIR = 0, 1, 2
+
+
+class Table(NamedTuple):
+    """Statistics of one kind of feature, M entries for each of P pixels.
+
+    Attributes:
+        features: (M, P) uint32.
+        seen: (M, P) float32, p(v) without the common factor; 0 is an empty entry.
+        shared: (M, P) float32, p(v|b) without its factor.
+    """
+
+    features: NDArray[np.uint32]
+    seen: NDArray[np.float32]
+    shared: NDArray[np.float32]
+
+    @classmethod
+    def empty(cls, entries: int, pixels: int) -> Table:
+        """Return a table without entries; memory is used as entries come."""
+        shape = entries, pixels
+        return cls(np.zeros(shape, np.uint32), np.zeros(shape, np.float32), np.zeros(shape, np.float32))
+
+
+@njit(cache=True)
+def same(kind, a, b, tolerance, floor):  # type: ignore[no-untyped-def]
+    """Tell whether two features are identified with each other: eq. (8), for pairs (9).
+
+    (8) is |a - b|^2 / (|a|^2 + |b|^2): a difference counts in proportion to the size. Below ``floor`` it is
+    noise whatever the size, which also covers 0 / 0: two gradients of nothing but noise, in any direction,
+    are the same.
+
+    Args:
+        kind: COLOUR, GRADIENT or PAIR.
+        a: uint32.
+        b: uint32.
+        tolerance: delta; of a pair the largest difference of a component, in levels.
+        floor: Distance |a - b| up to which features are the same; not used for pairs.
+    """
+    if a == b:
+        return True
+    if kind == PAIR:
+        for shift in range(0, 30, 5):
+            if abs(np.int32((a >> shift) & 31) - np.int32((b >> shift) & 31)) > tolerance:
+                return False
+        return True
+    apart, size = 0, 0
+    for shift in range(0, 24 if kind == COLOUR else 16, 8):
+        p, q = np.int32((a >> shift) & 255), np.int32((b >> shift) & 255)
+        if kind == GRADIENT:
+            p, q = p - 128, q - 128
+        apart += (p - q) * (p - q)
+        size += p * p + q * q
+    return apart <= max(tolerance * size, floor * floor)
+
+
+@njit(cache=True)
+def evidence(kind, table, i, feature, first, tolerance, floor):  # type: ignore[no-untyped-def]
+    """Sum p(v) and p(v|b) over the first N entries that are identified with a feature: eqs. (15), (16)."""
+    seen, shared = np.float32(0.0), np.float32(0.0)
+    for k in range(first):
+        if table.seen[k, i] == 0.0:
+            break
+        if same(kind, table.features[k, i], feature, tolerance, floor):
+            seen += table.seen[k, i]
+            shared += table.shared[k, i]
+    return seen, shared
+
+
+@njit(cache=True)
+def learn(kind, table, i, feature, grow, grow_shared, tolerance, floor):  # type: ignore[no-untyped-def]
+    """Count a feature: eqs. (10), (11), after the common factors have faded.
+
+    Of several identified entries the most frequent grows. An unknown feature takes the last entry's place,
+    with p(v|b) = rate only if it was background: as printed, (11) would make any new colour background at
+    its second sight.
+
+    Args:
+        kind: COLOUR, GRADIENT or PAIR.
+        table: Of all pixels.
+        i: Pixel.
+        feature: uint32.
+        grow: rate / factor of p(v).
+        grow_shared: rate / factor of p(v|b) if the pixel is background, else 0.
+        tolerance: As in `same`.
+        floor: As in `same`.
+    """
+    last = table.features.shape[0] - 1
+    k = 0
+    while True:
+        if table.seen[k, i] == 0.0:
+            known = False
+            break
+        if same(kind, table.features[k, i], feature, tolerance, floor):
+            known = True
+            break
+        if k == last:
+            known = False
+            break
+        k += 1
+    if known:
+        feature = table.features[k, i]
+        seen, shared = table.seen[k, i] + grow, table.shared[k, i] + grow_shared
+    else:
+        seen, shared = grow, grow_shared
+    while k > 0 and table.seen[k - 1, i] < seen:
+        table.features[k, i] = table.features[k - 1, i]
+        table.seen[k, i] = table.seen[k - 1, i]
+        table.shared[k, i] = table.shared[k - 1, i]
+        k -= 1
+    table.features[k, i], table.seen[k, i], table.shared[k, i] = feature, seen, shared
+
+
+@njit(cache=True)
+def foreign(table, i, first, p_b, factor, factor_shared):  # type: ignore[no-untyped-def]
+    """Return how much of what a pixel shows is frequent but not background: the left side of eq. (13)."""
+    seen, shared = np.float32(0.0), np.float32(0.0)
+    for k in range(first):
+        if table.seen[k, i] == 0.0:
+            break
+        seen += table.seen[k, i]
+        shared += table.shared[k, i]
+    return seen * factor - p_b * shared * factor_shared
+
+
+@njit(cache=True)
+def turn(table, i, first, p_b, factor, factor_shared):  # type: ignore[no-untyped-def]
+    """Make what was foreground background: eq. (14), with p(b) from before."""
+    for k in range(first):
+        if table.seen[k, i] == 0.0:
+            break
+        seen, shared = table.seen[k, i] * factor, table.shared[k, i] * factor_shared
+        table.shared[k, i] = (seen - p_b * shared) / ((np.float32(1.0) - p_b) * factor_shared)
