@@ -67,6 +67,8 @@ class BackgroundParameters:
         flash_share: Share of foreground pixels from which the light must have changed. Raising it withstands
             denser traffic.
         flash_frames: Successive frames of such a share before all is learnt anew.
+        follow_light: Whether the background image behind foreground follows the light of the rest, so that it
+            fits when it is seen again.
     """
 
     mode: StatMode = StatMode.CONDITIONAL
@@ -77,19 +79,22 @@ class BackgroundParameters:
     colours: tuple[int, int] = (15, 25)
     gradients: tuple[int, int] = (15, 25)
     pairs: tuple[int, int] = (25, 40)
-    tolerance: float = 0.005
-    colour_floor: float = 12.0
+    tolerance: float = 0.01
+    colour_floor: float = 15.0
     gradient_floor: float = 8.0
     pair_tolerance: int = 2
     once_off: float = 0.85
-    least_change: int = 10
+    least_change: int = 15
     most_change: int = 30
     flash_share: float = 0.5
     flash_frames: int = 3
+    follow_light: bool = True
 
 
-PAPER = BackgroundParameters(mode=StatMode.JOINT, colour_floor=0.0)
-"""As printed, with OpenCV's values where the paper's are lost: no tolerance of noise in dark pixels."""
+PAPER = BackgroundParameters(
+    mode=StatMode.JOINT, tolerance=0.005, colour_floor=0.0, least_change=10, follow_light=False
+)
+"""As printed, with OpenCV's values where the paper's are lost."""
 
 
 class Limits(NamedTuple):
@@ -178,7 +183,7 @@ class BackgroundModel:
             far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
             rate = np.float32(max(p.rate, min(p.start_rate, 1.0 / (self._frames + 1))))
             self._factor *= np.float32(1.0) - rate
-            foreground = _step(
+            foreground, light = _step(
                 pixels,
                 self._previous,
                 gradients,
@@ -196,6 +201,8 @@ class BackgroundModel:
             )
             if self._factor < FADED:
                 self._take_in()
+            if p.follow_light:
+                _carry(self._background, mask, light)
             self._watch_the_light(foreground / len(pixels))
         self._previous = pixels.copy()
         self._frames += 1
@@ -270,11 +277,15 @@ def _step(  # type: ignore[no-untyped-def]
     limits,
     mask,
 ):
-    """Classify all pixels and learn from them; returns how many are foreground."""
+    """Classify all pixels and learn from them.
+
+    Returns how many are foreground, and by what factor the channels of the unchanged background grew.
+    """
     delta, one = limits.tolerance, np.float32(1.0)
     floor_c, floor_e, delta_p = limits.colour_floor, limits.gradient_floor, limits.pair_tolerance
     grow = rate / factor
     count = 0
+    red, green, blue, more_red, more_green, more_blue = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(pixels.shape[0]):
         colour = np.uint32(_colour(pixels, i))
         edge = np.uint32(gradients[i])
@@ -297,8 +308,14 @@ def _step(  # type: ignore[no-untyped-def]
             vb *= shared_factor * eb * shared_factor
             is_b = 2.0 * vb * p_b[i] > v
         if not changed:
+            red += background[i, 0]
+            green += background[i, 1]
+            blue += background[i, 2]
             for c in range(3):
                 background[i, c] += limits.image_rate * (np.float32(pixels[i, c]) - background[i, c])
+            more_red += background[i, 0]
+            more_green += background[i, 1]
+            more_blue += background[i, 2]
         elif is_b:
             for c in range(3):
                 background[i, c] = pixels[i, c]
@@ -327,4 +344,13 @@ def _step(  # type: ignore[no-untyped-def]
         turn(edges, i, limits.gradients, p_b[i], factor, shared_factor)
         turn(pairs, i, limits.pairs, p_b[i], factor, shared_factor)
         p_b[i] = one - p_b[i]
-    return count
+    return count, (more_red / max(red, 1.0), more_green / max(green, 1.0), more_blue / max(blue, 1.0))
+
+
+@njit(cache=True)
+def _carry(background, mask, light):  # type: ignore[no-untyped-def]
+    """Let the background behind the foreground follow the light of what is seen."""
+    for i in range(mask.size):
+        if mask[i]:
+            for c in range(3):
+                background[i, c] = min(background[i, c] * light[c], np.float32(255.0))

@@ -21,6 +21,9 @@ from numpy.typing import NDArray
 
 COLOUR, GRADIENT, PAIR = 0, 1, 2
 
+# Three components of five bits, every ten bits: their places, bit 0, bits 0 to 7 and bit 8 of each.
+LANES, ONES, REST, TOPS = (np.uint32(bits * 0x100401) for bits in (0x1F, 0x1, 0xFF, 0x100))
+
 
 class Table(NamedTuple):
     """Statistics of one kind of feature, M entries for each of P pixels.
@@ -43,6 +46,18 @@ class Table(NamedTuple):
 
 
 @njit(cache=True)
+def _near(a, b, tolerance):  # type: ignore[no-untyped-def]
+    """Tell whether three components, each in five of ten bits, are all within a tolerance, in one go.
+
+    Bit 8 of each ten is set by a + tolerance >= b, and in what is left again by a > b + tolerance.
+    """
+    offset = np.uint32(tolerance)
+    above = a + (TOPS | ONES * offset) - b
+    beyond = (above & REST) + ONES * (np.uint32(255) - offset - offset)
+    return (above & ~beyond & TOPS) == TOPS
+
+
+@njit(cache=True)
 def same(kind, a, b, tolerance, floor):  # type: ignore[no-untyped-def]
     """Tell whether two features are identified with each other: eq. (8), for pairs (9).
 
@@ -60,10 +75,9 @@ def same(kind, a, b, tolerance, floor):  # type: ignore[no-untyped-def]
     if a == b:
         return True
     if kind == PAIR:
-        for shift in range(0, 30, 5):
-            if abs(np.int32((a >> shift) & 31) - np.int32((b >> shift) & 31)) > tolerance:
-                return False
-        return True
+        return _near(a & LANES, b & LANES, tolerance) and _near(
+            (a >> np.uint32(5)) & LANES, (b >> np.uint32(5)) & LANES, tolerance
+        )
     apart, size = 0, 0
     for shift in range(0, 24 if kind == COLOUR else 16, 8):
         p, q = np.int32((a >> shift) & 255), np.int32((b >> shift) & 255)
@@ -105,8 +119,12 @@ def learn(kind, table, i, feature, grow, grow_shared, tolerance, floor):  # type
         tolerance: As in `same`.
         floor: As in `same`.
     """
+    if same(kind, table.features[0, i], feature, tolerance, floor):
+        table.seen[0, i] += grow
+        table.shared[0, i] += grow_shared
+        return
     last = table.features.shape[0] - 1
-    k = 0
+    k = 1
     while True:
         if table.seen[k, i] == 0.0:
             known = False
