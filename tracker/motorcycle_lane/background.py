@@ -45,10 +45,9 @@ class BackgroundParameters:
     Attributes:
         mode: Reading of the statistics.
         rate: alpha. Raising it absorbs stopped objects sooner and forgets rare background sooner.
-        start_rate: Highest alpha while the first frames are averaged. Raising it lets the very first frames
-            weigh more.
         start_frames: Frames of training, in which a pixel is background if it shows its most frequent colour.
-            Raising it learns through denser traffic, and takes longer.
+            Raising it learns through denser traffic, and takes longer. The first 1 / alpha frames all weigh
+            the same, so alpha begins at 1 and is a thirtieth after 30 frames.
         image_rate: beta of the background image. Raising it follows the light faster, and noise too.
         colours: N, M of the colour table: entries used, and kept. Raising them holds rarer background.
         gradients: N, M of the gradient table.
@@ -73,7 +72,6 @@ class BackgroundParameters:
 
     mode: StatMode = StatMode.CONDITIONAL
     rate: float = 0.005
-    start_rate: float = 0.1
     start_frames: int = 30
     image_rate: float = 0.1
     colours: tuple[int, int] = (15, 25)
@@ -100,14 +98,13 @@ PAPER = BackgroundParameters(
 class Limits(NamedTuple):
     """What the kernel needs of the parameters."""
 
-    conditional: bool
     colours: int
     gradients: int
     pairs: int
-    tolerance: np.float32
-    colour_floor: np.float32
-    gradient_floor: np.float32
-    pair_tolerance: np.float32
+    tolerance: float
+    colour_floor: float
+    gradient_floor: float
+    pair_tolerance: int
     once_off: np.float32
     image_rate: np.float32
 
@@ -129,23 +126,26 @@ class BackgroundModel:
             Table.empty(p.pairs[1], pixels),
         )
         self._limits = Limits(
-            p.mode is StatMode.CONDITIONAL,
             p.colours[0],
             p.gradients[0],
             p.pairs[0],
-            np.float32(p.tolerance),
-            np.float32(p.colour_floor),
-            np.float32(p.gradient_floor),
-            np.float32(p.pair_tolerance),
+            p.tolerance,
+            p.colour_floor,
+            p.gradient_floor,
+            p.pair_tolerance,
             np.float32(p.once_off),
             np.float32(p.image_rate),
         )
         self._background = np.zeros((pixels, 3), np.float32)
         self._previous: NDArray[np.uint8] | None = None
         # p(b) of each pixel: one for all tables, since all learn from the same frames.
-        self._p_b = np.ones(pixels, np.float32)
+        self._p_b = np.zeros(pixels, np.float32)
         self._factor = np.float32(1.0)
         self._factor_shared = np.ones(pixels, np.float32)
+        # Whether p(v|b) has a factor of its own, by pixel: in conditional mode once the training is over.
+        self._conditional = False
+        # Weight of what came before p(v|b) and p(b) were last begun.
+        self._earlier = np.float32(0.0)
         self._frames = 0
         self._flashing = 0
 
@@ -158,6 +158,14 @@ class BackgroundModel:
     def training(self) -> bool:
         """Whether the next frame belongs to the training."""
         return self._frames < self.parameters.start_frames
+
+    def statistics(self, row: int, column: int) -> tuple[NDArray[np.float64], ...]:
+        """Return what a pixel has learnt: (K, 2) p(v) and p(v|b) of colours, gradients and pairs."""
+        i = row * self._shape[1] + column
+        shared = self._factor_shared[i] if self._conditional else self._factor
+        factors = np.array([self._factor, shared], np.float64)
+        both = (np.stack([table.seen[:, i], table.shared[:, i]], 1) for table in self._tables)
+        return tuple(factors * values[values[:, 0] > 0] for values in both)
 
     def apply(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """Classify and learn one frame.
@@ -177,12 +185,17 @@ class BackgroundModel:
         pixels = np.ascontiguousarray(image).reshape(-1, 3)
         gradients = gradient(image)
         mask = np.zeros(len(pixels), np.bool_)
-        if self._previous is None:
-            _begin(pixels, gradients, self._background, *self._tables)
+        if self._previous is None or self._frames == 0:
+            self._begin(pixels, gradients)
         else:
+            if self._frames == p.start_frames // 2:
+                self._begin_background()
+            if self._frames == p.start_frames:
+                self._settle()
             far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
-            rate = np.float32(max(p.rate, min(p.start_rate, 1.0 / (self._frames + 1))))
+            rate = np.float32(max(p.rate, 1.0 / (self._frames + 1)))
             self._factor *= np.float32(1.0) - rate
+            self._earlier *= np.float32(1.0) - rate
             foreground, light = _step(
                 pixels,
                 self._previous,
@@ -196,6 +209,7 @@ class BackgroundModel:
                 self._factor_shared,
                 rate,
                 self.training,
+                self._conditional,
                 self._limits,
                 mask,
             )
@@ -203,25 +217,51 @@ class BackgroundModel:
                 self._take_in()
             if p.follow_light:
                 _carry(self._background, mask, light)
-            self._watch_the_light(foreground / len(pixels))
+            flash = foreground > p.flash_share * len(pixels) and not self.training
+            self._flashing = self._flashing + 1 if flash else 0
         self._previous = pixels.copy()
         self._frames += 1
+        if self._flashing == p.flash_frames:
+            self._frames = self._flashing = 0
         return mask.reshape(self._shape)
 
-    def _watch_the_light(self, share: float) -> None:
-        """Learn anew if most of the image has been foreground for some frames: a once-off change of all."""
-        p = self.parameters
-        self._flashing = self._flashing + 1 if share > p.flash_share and not self.training else 0
-        if self._flashing == p.flash_frames:
-            self._flashing, self._frames = 0, 0
-            self._background[:] = self._previous
+    def _begin(self, pixels: NDArray[np.uint8], gradients: NDArray[np.uint16]) -> None:
+        """Take a frame for background, the only thing that each pixel has ever shown."""
+        for table in self._tables:
+            table.seen[:] = 0.0
+        self._background[:] = pixels
+        self._p_b[:] = 1.0
+        self._factor, self._earlier = np.float32(1.0), np.float32(0.0)
+        self._conditional = False
+        _fill(pixels, gradients, *self._tables)
+
+    def _begin_background(self) -> None:
+        """Forget what went for background so far: only now is it known what each pixel shows most often."""
+        for table in self._tables:
+            table.shared[:] = 0.0
+        self._p_b[:] = 0.0
+        self._earlier = np.float32(1.0)
+
+    def _settle(self) -> None:
+        """End the training: p(b) and p(v and b), seen in a part of it, stand for the whole."""
+        share = np.float32(1.0) - self._earlier
+        self._p_b /= share
+        if self.parameters.mode is StatMode.JOINT:
+            for table in self._tables:
+                table.shared[:] /= share
+            return
+        self._conditional = True
+        self._factor_shared[:] = 1.0
+        scale = self._factor / (share * np.maximum(self._p_b, np.float32(1e-6)))
+        for table in self._tables:
+            table.shared[:] *= scale
+
 
     def _take_in(self) -> None:
         """Multiply the tables by the common factor and begin it again."""
-        joint = self.parameters.mode is StatMode.JOINT
         for table in self._tables:
             table.seen[:] *= self._factor
-            if joint:
+            if not self._conditional:
                 table.shared[:] *= self._factor
         self._factor = np.float32(1.0)
 
@@ -246,16 +286,14 @@ def _coarse(colour):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _begin(pixels, gradients, background, colours, edges, pairs):  # type: ignore[no-untyped-def]
-    """Take the first frame for background, the only thing that each pixel has ever shown."""
+def _fill(pixels, gradients, colours, edges, pairs):  # type: ignore[no-untyped-def]
+    """Put the features of one frame in the first place."""
     for i in range(pixels.shape[0]):
         colour = np.uint32(_colour(pixels, i))
         features = (colour, np.uint32(gradients[i]), np.uint32((_coarse(colour) << 15) | _coarse(colour)))
         for table, feature in zip((colours, edges, pairs), features):  # noqa: B905 - numba knows no strict
             table.features[0, i] = feature
             table.seen[0, i] = table.shared[0, i] = 1.0
-        for c in range(3):
-            background[i, c] = pixels[i, c]
 
 
 @njit(cache=True)
@@ -274,6 +312,7 @@ def _step(  # type: ignore[no-untyped-def]
     factor_shared,
     rate,
     training,
+    conditional,
     limits,
     mask,
 ):
@@ -291,7 +330,7 @@ def _step(  # type: ignore[no-untyped-def]
         edge = np.uint32(gradients[i])
         pair = np.uint32((_coarse(_colour(previous, i)) << 15) | _coarse(colour))
         changed = far[i] or moved[i]
-        shared_factor = factor_shared[i] if limits.conditional else factor / (one - rate)
+        shared_factor = factor_shared[i] if conditional else factor / (one - rate)
         if not changed:
             is_b = True
         elif training:
@@ -321,7 +360,7 @@ def _step(  # type: ignore[no-untyped-def]
                 background[i, c] = pixels[i, c]
         p_b[i] += rate * ((one if is_b else np.float32(0.0)) - p_b[i])
         shared_factor = factor
-        if limits.conditional:
+        if conditional:
             if is_b:
                 factor_shared[i] *= one - rate
             shared_factor = factor_shared[i]
@@ -330,7 +369,7 @@ def _step(  # type: ignore[no-untyped-def]
         learn(GRADIENT, edges, i, edge, grow, grow_shared, delta, floor_e)
         learn(PAIR, pairs, i, pair, grow, grow_shared, delta_p, floor_c)
         if is_b:
-            if limits.conditional and shared_factor < FADED:
+            if conditional and shared_factor < FADED:
                 for table in (colours, edges, pairs):
                     for k in range(table.shared.shape[0]):
                         table.shared[k, i] *= shared_factor
@@ -344,7 +383,12 @@ def _step(  # type: ignore[no-untyped-def]
         turn(edges, i, limits.gradients, p_b[i], factor, shared_factor)
         turn(pairs, i, limits.pairs, p_b[i], factor, shared_factor)
         p_b[i] = one - p_b[i]
-    return count, (more_red / max(red, 1.0), more_green / max(green, 1.0), more_blue / max(blue, 1.0))
+    light = (
+        more_red / red if red > 0.0 else 1.0,
+        more_green / green if green > 0.0 else 1.0,
+        more_blue / blue if blue > 0.0 else 1.0,
+    )
+    return count, light
 
 
 @njit(cache=True)

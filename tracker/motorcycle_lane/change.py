@@ -58,6 +58,5 @@ def corner(counts: NDArray[np.int64], least: int, most: int) -> int:
     if last <= peak:
         return least
     bins = np.arange(peak, last + 1)
-    drop = (counts[peak] - counts[last]) / (last - peak)
-    below = counts[peak] - drop * (bins - peak) - counts[peak : last + 1]
+    below = (counts[peak] - counts[bins]) * (last - peak) - (counts[peak] - counts[last]) * (bins - peak)
     return int(np.clip(peak + np.argmax(below), least, most))

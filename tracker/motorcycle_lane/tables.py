@@ -1,7 +1,7 @@
 """Tables of statistics of one pixel's features: eqs. (5), (6), (8)-(16) of paper 3.
 
 A table holds for each pixel the features seen most often, with how often: p(v), and how often as background:
-p(v|b), sorted by p(v). Every frame all entries fade by (1 - rate) and the one seen grows by the rate. Fading
+p(v|b), sorted by p(v), of equals the latest first. Every frame all entries fade by (1 - rate) and the one seen grows by the rate. Fading
 all of them would touch the whole memory in each frame, so a common factor is kept aside instead: an entry holds
 its value divided by that factor, grows by rate / factor, and all others stay as they are. Values are the same
 up to rounding, and so is the order. The layout is plane by plane, entry 0 of all pixels first: most pixels
@@ -20,6 +20,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 COLOUR, GRADIENT, PAIR = 0, 1, 2
+
+LATEST = np.float32(1.0001)
+"""Of two entries as frequent the later one comes first; frequencies are the same up to this factor."""
 
 # Three components of five bits, every ten bits: their places, bit 0, bits 0 to 7 and bit 8 of each.
 LANES, ONES, REST, TOPS = (np.uint32(bits * 0x100401) for bits in (0x1F, 0x1, 0xFF, 0x100))
@@ -141,7 +144,7 @@ def learn(kind, table, i, feature, grow, grow_shared, tolerance, floor):  # type
         seen, shared = table.seen[k, i] + grow, table.shared[k, i] + grow_shared
     else:
         seen, shared = grow, grow_shared
-    while k > 0 and table.seen[k - 1, i] < seen:
+    while k > 0 and table.seen[k - 1, i] <= seen * LATEST:
         table.features[k, i] = table.features[k - 1, i]
         table.seen[k, i] = table.seen[k - 1, i]
         table.shared[k, i] = table.shared[k - 1, i]
