@@ -68,6 +68,9 @@ class BackgroundParameters:
         flash_frames: Successive frames of such a share before all is learnt anew.
         follow_light: Whether the background image behind foreground follows the light of the rest, so that it
             fits when it is seen again.
+        uncovered: Whether a pixel that moved and now equals the background image is background, without asking
+            for its pair of colours. As printed it is asked, and the strip that an object has just uncovered
+            is foreground.
     """
 
     mode: StatMode = StatMode.CONDITIONAL
@@ -87,10 +90,16 @@ class BackgroundParameters:
     flash_share: float = 0.5
     flash_frames: int = 3
     follow_light: bool = True
+    uncovered: bool = True
 
 
 PAPER = BackgroundParameters(
-    mode=StatMode.JOINT, tolerance=0.005, colour_floor=0.0, least_change=10, follow_light=False
+    mode=StatMode.JOINT,
+    tolerance=0.005,
+    colour_floor=0.0,
+    least_change=10,
+    follow_light=False,
+    uncovered=False,
 )
 """As printed, with OpenCV's values where the paper's are lost."""
 
@@ -107,6 +116,7 @@ class Limits(NamedTuple):
     pair_tolerance: int
     once_off: np.float32
     image_rate: np.float32
+    uncovered: bool
 
 
 class BackgroundModel:
@@ -135,6 +145,7 @@ class BackgroundModel:
             p.pair_tolerance,
             np.float32(p.once_off),
             np.float32(p.image_rate),
+            p.uncovered,
         )
         self._background = np.zeros((pixels, 3), np.float32)
         self._previous: NDArray[np.uint8] | None = None
@@ -329,7 +340,7 @@ def _step(  # type: ignore[no-untyped-def]
         colour = np.uint32(_colour(pixels, i))
         edge = np.uint32(gradients[i])
         pair = np.uint32((_coarse(_colour(previous, i)) << 15) | _coarse(colour))
-        changed = far[i] or moved[i]
+        changed = far[i] or (moved[i] and not limits.uncovered)
         shared_factor = factor_shared[i] if conditional else factor / (one - rate)
         if not changed:
             is_b = True

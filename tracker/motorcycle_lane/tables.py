@@ -166,9 +166,15 @@ def foreign(table, i, first, p_b, factor, factor_shared):  # type: ignore[no-unt
 
 @njit(cache=True)
 def turn(table, i, first, p_b, factor, factor_shared):  # type: ignore[no-untyped-def]
-    """Make what was foreground background: eq. (14), with p(b) from before."""
+    """Make what was foreground background: eq. (14), with p(b) from before.
+
+    What was background by eq. (4) stays so, as it is: as printed it would turn into foreground, and be a
+    ghost for as long again when what has been absorbed leaves.
+    """
     for k in range(first):
         if table.seen[k, i] == 0.0:
             break
         seen, shared = table.seen[k, i] * factor, table.shared[k, i] * factor_shared
+        if 2.0 * shared * p_b > seen:
+            continue
         table.shared[k, i] = (seen - p_b * shared) / ((np.float32(1.0) - p_b) * factor_shared)

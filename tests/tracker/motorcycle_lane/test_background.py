@@ -156,6 +156,15 @@ def test_absorption_follows_the_formula(mode, once_off):
 
 
 @pytest.mark.parametrize("mode", MODES)
+def test_what_was_background_is_no_ghost_when_the_absorbed_leaves(mode):
+    model = BackgroundModel(3, 3, BackgroundParameters(mode=mode, flash_share=1.0))
+    masks = [model.apply(patch(60 if t < 300 or t >= 900 else 180)).any() for t in range(910)]
+    assert all(masks[300:400])
+    assert not any(masks[850:900])
+    assert not any(masks[901:])
+
+
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("visible", [0.4, 0.45, 0.55, 0.6])
 def test_rarely_visible_background_flips_at_one_half(mode, visible):
     """A is background and B not, at all times; is A still background by eq. (4)?"""

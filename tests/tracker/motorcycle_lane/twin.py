@@ -132,7 +132,7 @@ class PlainModel:
         for at in np.ndindex(self.shape):
             features = self.features(image, edges, at)
             mask[at] = not self.pixel(at, image, features, far[at], moved[at], training, rate)
-        still = ~far & ~moved
+        still = ~far & ~(moved & (not p.uncovered))
         if p.follow_light and still.any():
             sums, old = self.background[still].sum(0), before[still].sum(0)
             growth = np.where(old > 0, sums / np.maximum(old, 1e-9), 1)
@@ -167,6 +167,7 @@ class PlainModel:
         """Classify and learn; returns whether the pixel is background."""
         p = self.parameters
         tables, p_b = self.tables[at[0]][at[1]], self.p_b[at]
+        moved = moved and (far or not p.uncovered)
         if not far and not moved:
             is_b = True
         elif training:
@@ -188,6 +189,7 @@ class PlainModel:
         if not is_b and not training and seen - p_b * shared > p.once_off:
             for table in tables:
                 for entry in table.entries[: table.used]:
-                    entry[1] = (entry[0] - p_b * entry[1]) / (1 - p_b)
+                    if 2 * entry[1] * p_b <= entry[0]:
+                        entry[1] = (entry[0] - p_b * entry[1]) / (1 - p_b)
             self.p_b[at] = 1 - p_b
         return is_b
