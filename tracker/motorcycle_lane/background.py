@@ -329,7 +329,7 @@ def _step(  # type: ignore[no-untyped-def]
 ):
     """Classify all pixels and learn from them.
 
-    Returns how many are foreground, and by what factor the channels of the unchanged background grew.
+    Returns how many are foreground, and by what factor each channel of the background that is seen grew.
     """
     delta, one = limits.tolerance, np.float32(1.0)
     floor_c, floor_e, delta_p = limits.colour_floor, limits.gradient_floor, limits.pair_tolerance
@@ -357,18 +357,16 @@ def _step(  # type: ignore[no-untyped-def]
             v *= (factor / (one - rate)) * e * (factor / (one - rate))
             vb *= shared_factor * eb * shared_factor
             is_b = 2.0 * vb * p_b[i] > v
-        if not changed:
+        if is_b:
             red += background[i, 0]
             green += background[i, 1]
             blue += background[i, 2]
+            weight = one if changed else limits.image_rate
             for c in range(3):
-                background[i, c] += limits.image_rate * (np.float32(pixels[i, c]) - background[i, c])
+                background[i, c] += weight * (np.float32(pixels[i, c]) - background[i, c])
             more_red += background[i, 0]
             more_green += background[i, 1]
             more_blue += background[i, 2]
-        elif is_b:
-            for c in range(3):
-                background[i, c] = pixels[i, c]
         p_b[i] += rate * ((one if is_b else np.float32(0.0)) - p_b[i])
         shared_factor = factor
         if conditional:

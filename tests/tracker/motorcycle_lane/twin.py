@@ -132,9 +132,9 @@ class PlainModel:
         for at in np.ndindex(self.shape):
             features = self.features(image, edges, at)
             mask[at] = not self.pixel(at, image, features, far[at], moved[at], training, rate)
-        still = ~far & ~(moved & (not p.uncovered))
-        if p.follow_light and still.any():
-            sums, old = self.background[still].sum(0), before[still].sum(0)
+        seen = ~mask
+        if p.follow_light and seen.any():
+            sums, old = self.background[seen].sum(0), before[seen].sum(0)
             growth = np.where(old > 0, sums / np.maximum(old, 1e-9), 1)
             self.background[mask] = np.minimum(self.background[mask] * growth, 255)
         self.flashing = self.flashing + 1 if mask.mean() > p.flash_share and not training else 0
