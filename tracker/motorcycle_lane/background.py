@@ -2,8 +2,8 @@
 
 Each pixel learns how often it shows which colour, gradient and pair of successive colours, and how often as
 background. A pixel that differs neither from the background image nor from the frame before is background;
-one that keeps still is judged by colour and gradient, eq. (7), one that moves by its pair of colours, eq. (4).
-What stays for long becomes background at once, eqs. (12)-(14).
+one that keeps still is judged by colour and gradient, eq. (7), one that moves by its pair of colours,
+eq. (4). What stays for long becomes background at once, eqs. (12)-(14).
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class BackgroundParameters:
         flash_share: Share of foreground pixels from which the light must have changed. Raising it withstands
             denser traffic.
         flash_frames: Successive frames of such a share before all is learnt anew.
-        follow_light: Whether the background image behind foreground follows the light of the rest, so that it
+        follow_light: Whether the background image behind foreground follows the light of the rest, so it
             fits when it is seen again.
         uncovered: Whether a pixel that moved and now equals the background image is background, without asking
             for its pair of colours. As printed it is asked, and the strip that an object has just uncovered
@@ -266,7 +266,6 @@ class BackgroundModel:
         scale = self._factor / (share * np.maximum(self._p_b, np.float32(1e-6)))
         for table in self._tables:
             table.shared[:] *= scale
-
 
     def _take_in(self) -> None:
         """Multiply the tables by the common factor and begin it again."""

@@ -29,11 +29,11 @@ def differences(image, background, previous):  # type: ignore[no-untyped-def]
     count = image.shape[0]
     far, moved = np.empty(count, np.uint8), np.empty(count, np.uint8)
     for i in range(count):
-        most_far, most_moved = np.float32(0.0), 0
+        most_far, most_moved = np.float32(0.0), np.int32(0)
         for c in range(3):
             value = np.int32(image[i, c])
             most_far = max(most_far, abs(np.float32(value) - background[i, c]))
-            most_moved = max(most_moved, abs(value - np.int32(previous[i, c])))
+            most_moved = max(most_moved, np.int32(abs(value - np.int32(previous[i, c]))))
         far[i], moved[i] = np.uint8(most_far + np.float32(0.5)), np.uint8(most_moved)
     far_counts, moved_counts = np.zeros(256, np.int64), np.zeros(256, np.int64)
     for i in range(count):

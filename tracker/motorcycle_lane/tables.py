@@ -1,11 +1,11 @@
 """Tables of statistics of one pixel's features: eqs. (5), (6), (8)-(16) of paper 3.
 
-A table holds for each pixel the features seen most often, with how often: p(v), and how often as background:
-p(v|b), sorted by p(v), of equals the latest first. Every frame all entries fade by (1 - rate) and the one seen grows by the rate. Fading
-all of them would touch the whole memory in each frame, so a common factor is kept aside instead: an entry holds
-its value divided by that factor, grows by rate / factor, and all others stay as they are. Values are the same
-up to rounding, and so is the order. The layout is plane by plane, entry 0 of all pixels first: most pixels
-need no other.
+A table holds for each pixel the features seen most often, how often: p(v), and how often as background:
+p(v|b), sorted by p(v), of equals the latest first. Every frame all entries fade by (1 - rate) and the one
+seen grows by the rate. Fading all of them would touch the whole memory in each frame, so a common factor is
+kept aside instead: an entry holds its value divided by that factor, grows by rate / factor, and all others
+stay as they are. Values are the same up to rounding, and so is the order. The layout is plane by plane,
+entry 0 of all pixels first: most pixels need no other.
 
 Features are packed into 32 bits: three bytes of colour; two signed bytes of gradient; six times five bits of
 colour before and now.
@@ -81,11 +81,10 @@ def same(kind, a, b, tolerance, floor):  # type: ignore[no-untyped-def]
         return _near(a & LANES, b & LANES, tolerance) and _near(
             (a >> np.uint32(5)) & LANES, (b >> np.uint32(5)) & LANES, tolerance
         )
+    middle = 128 if kind == GRADIENT else 0
     apart, size = 0, 0
     for shift in range(0, 24 if kind == COLOUR else 16, 8):
-        p, q = np.int32((a >> shift) & 255), np.int32((b >> shift) & 255)
-        if kind == GRADIENT:
-            p, q = p - 128, q - 128
+        p, q = int((a >> shift) & 255) - middle, int((b >> shift) & 255) - middle
         apart += (p - q) * (p - q)
         size += p * p + q * q
     return apart <= max(tolerance * size, floor * floor)

@@ -192,11 +192,12 @@ def test_background_is_learnt_within_the_first_frames(mode):
     rng = np.random.default_rng(1)
     base = rng.integers(60, 180, (24, 32, 3))
     model = BackgroundModel(32, 24, BackgroundParameters(mode=mode))
+    was_covered = np.zeros(32, bool)
     for t in range(60):
         picture = base + rng.normal(0, 2, base.shape)
         left = (2 * t) % 64
         covered = (np.arange(32) - left) % 64 < 16
-        picture[4:20, covered] = (200, 30, 30) + rng.normal(0, 2, (16, covered.sum(), 3))
+        picture[4:20, covered] = rng.normal((200, 30, 30), 2, (16, covered.sum(), 3))
         mask = model.apply(np.clip(picture, 0, 255).astype(np.uint8))
         if t > 40:
             assert mask[4:20][:, covered].all()

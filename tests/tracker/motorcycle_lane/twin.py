@@ -108,7 +108,9 @@ class PlainModel:
             self.clear(lambda table: table.entries.clear())
             self.earlier = 0.0
             for at in np.ndindex(self.shape):
-                for table, feature in zip(self.tables[at[0]][at[1]], self.features(image, edges, at), strict=True):
+                for table, feature in zip(
+                    self.tables[at[0]][at[1]], self.features(image, edges, at), strict=True
+                ):
                     table.learn(feature, True, 1.0, p.mode)
             self.frames = 1
             return mask
