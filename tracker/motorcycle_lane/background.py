@@ -68,9 +68,9 @@ class BackgroundParameters:
         flash_frames: Successive frames of such a share before all is learnt anew.
         follow_light: Whether the background image behind foreground follows the light of the rest, so it
             fits when it is seen again.
-        uncovered: Whether a pixel that moved and now equals the background image is background, without asking
-            for its pair of colours. As printed it is asked, and the strip that an object has just uncovered
-            is foreground.
+        uncovered: Whether a pixel that moved and now equals the background image is background, whatever its
+            pair of colours. As printed the pair decides, and the strip that an object has just uncovered is
+            foreground.
     """
 
     mode: StatMode = StatMode.CONDITIONAL
