@@ -104,6 +104,9 @@ PAPER = BackgroundParameters(
 """As printed, with OpenCV's values where the paper's are lost."""
 
 
+Features = tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.uint32]]
+
+
 class Limits(NamedTuple):
     """What the kernel needs of the parameters."""
 
@@ -148,7 +151,7 @@ class BackgroundModel:
             p.uncovered,
         )
         self._background = np.zeros((pixels, 3), np.float32)
-        self._previous: NDArray[np.uint8] | None = None
+        self._previous = np.zeros((pixels, 3), np.uint8)
         # p(b) of each pixel: one for all tables, since all learn from the same frames.
         self._p_b = np.zeros(pixels, np.float32)
         self._factor = np.float32(1.0)
@@ -194,41 +197,18 @@ class BackgroundModel:
             raise ValueError(f"image is {image.shape}, wanted {(*self._shape, 3)}")
         p = self.parameters
         pixels = np.ascontiguousarray(image).reshape(-1, 3)
-        gradients = gradient(image)
-        mask = np.zeros(len(pixels), np.bool_)
-        if self._previous is None or self._frames == 0:
-            self._begin(pixels, gradients)
+        previous = pixels if self._frames == 0 else self._previous
+        features = _features(pixels, previous, gradient(image))
+        if self._frames == 0:
+            self._begin(pixels, features)
+            mask = np.zeros(len(pixels), np.bool_)
         else:
             if self._frames == p.start_frames // 2:
                 self._begin_background()
             if self._frames == p.start_frames:
                 self._settle()
-            far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
-            rate = np.float32(max(p.rate, 1.0 / (self._frames + 1)))
-            self._factor *= np.float32(1.0) - rate
-            self._earlier *= np.float32(1.0) - rate
-            foreground, light = _step(
-                pixels,
-                self._previous,
-                gradients,
-                far > corner(far_counts, p.least_change, p.most_change),
-                moved > corner(moved_counts, p.least_change, p.most_change),
-                self._background,
-                *self._tables,
-                self._p_b,
-                self._factor,
-                self._factor_shared,
-                rate,
-                self.training,
-                self._conditional,
-                self._limits,
-                mask,
-            )
-            if self._factor < FADED:
-                self._take_in()
-            if p.follow_light:
-                _carry(self._background, mask, light)
-            flash = foreground > p.flash_share * len(pixels) and not self.training
+            mask = self._step(pixels, features)
+            flash = mask.mean() > p.flash_share and not self.training
             self._flashing = self._flashing + 1 if flash else 0
         self._previous = pixels.copy()
         self._frames += 1
@@ -236,15 +216,66 @@ class BackgroundModel:
             self._frames = self._flashing = 0
         return mask.reshape(self._shape)
 
-    def _begin(self, pixels: NDArray[np.uint8], gradients: NDArray[np.uint16]) -> None:
+    def _step(self, pixels: NDArray[np.uint8], features: Features) -> NDArray[np.bool_]:
+        """Classify a frame, then learn from it; returns the foreground (P,)."""
+        p, one = self.parameters, np.float32(1.0)
+        far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
+        background, light = _classify(
+            pixels,
+            features,
+            far > corner(far_counts, p.least_change, p.most_change),
+            moved > corner(moved_counts, p.least_change, p.most_change),
+            self._background,
+            self._tables,
+            self._p_b,
+            self._factor,
+            self._factor_shared if self._conditional else np.full(1, self._factor),
+            self.training,
+            self._limits,
+        )
+        foreground = ~background
+        if p.follow_light:
+            _carry(self._background, foreground, light)
+        rate = np.float32(max(p.rate, 1.0 / (self._frames + 1)))
+        self._earlier *= one - rate
+        self._factor *= one - rate
+        self._p_b += rate * (background - self._p_b)
+        if self._conditional:
+            self._factor_shared[background] *= one - rate
+            grow_shared = background * (rate / self._factor_shared)
+        else:
+            grow_shared = background * (rate / self._factor)
+        for kind, table, feature, tolerance, floor in zip(
+            (COLOUR, GRADIENT, PAIR),
+            self._tables,
+            features,
+            (p.tolerance, p.tolerance, p.pair_tolerance),
+            (p.colour_floor, p.gradient_floor, 0.0),
+            strict=True,
+        ):
+            learn(kind, table, feature, rate / self._factor, grow_shared, tolerance, floor)
+        if not self.training:
+            _turn_once_off(
+                foreground,
+                self._tables,
+                self._p_b,
+                self._factor,
+                self._factor_shared if self._conditional else np.full(1, self._factor),
+                self._limits,
+            )
+        self._take_in()
+        return foreground
+
+    def _begin(self, pixels: NDArray[np.uint8], features: Features) -> None:
         """Take a frame for background, the only thing that each pixel has ever shown."""
-        for table in self._tables:
+        for table, feature in zip(self._tables, features, strict=True):
             table.seen[:] = 0.0
+            table.features[0] = feature
+            table.seen[0] = table.shared[0] = 1.0
         self._background[:] = pixels
         self._p_b[:] = 1.0
         self._factor, self._earlier = np.float32(1.0), np.float32(0.0)
         self._conditional = False
-        _fill(pixels, gradients, *self._tables)
 
     def _begin_background(self) -> None:
         """Forget what went for background so far: only now is it known what each pixel shows most often."""
@@ -268,12 +299,18 @@ class BackgroundModel:
             table.shared[:] *= scale
 
     def _take_in(self) -> None:
-        """Multiply the tables by the common factor and begin it again."""
-        for table in self._tables:
-            table.seen[:] *= self._factor
-            if not self._conditional:
-                table.shared[:] *= self._factor
-        self._factor = np.float32(1.0)
+        """Take common factors that have become small into the tables, and begin them again."""
+        if self._factor < FADED:
+            for table in self._tables:
+                table.seen[:] *= self._factor
+                if not self._conditional:
+                    table.shared[:] *= self._factor
+            self._factor = np.float32(1.0)
+        if self._conditional and self._factor_shared.min() < FADED:
+            faded = np.flatnonzero(self._factor_shared < FADED)
+            for table in self._tables:
+                table.shared[:, faded] *= self._factor_shared[faded]
+            self._factor_shared[faded] = 1.0
 
 
 def gradient(image: NDArray[np.uint8]) -> NDArray[np.uint16]:
@@ -296,107 +333,82 @@ def _coarse(colour):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fill(pixels, gradients, colours, edges, pairs):  # type: ignore[no-untyped-def]
-    """Put the features of one frame in the first place."""
-    for i in range(pixels.shape[0]):
-        colour = np.uint32(_colour(pixels, i))
-        features = (colour, np.uint32(gradients[i]), np.uint32((_coarse(colour) << 15) | _coarse(colour)))
-        for table, feature in zip((colours, edges, pairs), features):  # noqa: B905 - numba knows no strict
-            table.features[0, i] = feature
-            table.seen[0, i] = table.shared[0, i] = 1.0
+def _features(pixels, previous, gradients):  # type: ignore[no-untyped-def]
+    """Return the colours, gradients and pairs of colours of all pixels, (P,) uint32 each, packed."""
+    count = pixels.shape[0]
+    colours, edges, pairs = (
+        np.empty(count, np.uint32),
+        np.empty(count, np.uint32),
+        np.empty(count, np.uint32),
+    )
+    for i in range(count):
+        colours[i] = _colour(pixels, i)
+        edges[i] = gradients[i]
+        pairs[i] = (_coarse(_colour(previous, i)) << 15) | _coarse(_colour(pixels, i))
+    return colours, edges, pairs
 
 
 @njit(cache=True)
-def _step(  # type: ignore[no-untyped-def]
-    pixels,
-    previous,
-    gradients,
-    far,
-    moved,
-    background,
-    colours,
-    edges,
-    pairs,
-    p_b,
-    factor,
-    factor_shared,
-    rate,
-    training,
-    conditional,
-    limits,
-    mask,
+def _classify(  # type: ignore[no-untyped-def]
+    pixels, features, far, moved, background, tables, p_b, factor, factors_shared, training, limits
 ):
-    """Classify all pixels and learn from them.
+    """Tell background from foreground: eqs. (4), (7); and keep the background image: eqs. (17), (18).
 
-    Returns how many are foreground, and by what factor each channel of the background that is seen grew.
+    Returns (P,) bool, and by what factor each channel of the background that is seen grew.
     """
-    delta, one = limits.tolerance, np.float32(1.0)
-    floor_c, floor_e, delta_p = limits.colour_floor, limits.gradient_floor, limits.pair_tolerance
-    grow = rate / factor
-    count = 0
-    red, green, blue, more_red, more_green, more_blue = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(pixels.shape[0]):
-        colour = np.uint32(_colour(pixels, i))
-        edge = np.uint32(gradients[i])
-        pair = np.uint32((_coarse(_colour(previous, i)) << 15) | _coarse(colour))
+    colours, edges, pairs = features
+    is_background = np.empty(colours.size, np.bool_)
+    before, after = np.zeros(3), np.zeros(3)
+    for i in range(colours.size):
         changed = far[i] or (moved[i] and not limits.uncovered)
-        shared_factor = factor_shared[i] if conditional else factor / (one - rate)
-        if not changed:
-            is_b = True
-        elif training:
-            is_b = same(COLOUR, colours.features[0, i], colour, delta, floor_c)
-        elif moved[i]:
-            v, vb = evidence(PAIR, pairs, i, pair, limits.pairs, delta_p, floor_c)
-            v *= factor / (one - rate)
-            vb *= shared_factor
-            is_b = 2.0 * vb * p_b[i] > v
-        else:
-            v, vb = evidence(COLOUR, colours, i, colour, limits.colours, delta, floor_c)
-            e, eb = evidence(GRADIENT, edges, i, edge, limits.gradients, delta, floor_e)
-            v *= (factor / (one - rate)) * e * (factor / (one - rate))
-            vb *= shared_factor * eb * shared_factor
-            is_b = 2.0 * vb * p_b[i] > v
+        is_b = True
+        if changed:
+            factor_shared = factors_shared[i % factors_shared.size]
+            if training:
+                is_b = same(
+                    COLOUR, tables[0].features[0, i], colours[i], limits.tolerance, limits.colour_floor
+                )
+            elif moved[i]:
+                v, vb = evidence(PAIR, tables[2], i, pairs[i], limits.pairs, limits.pair_tolerance, 0.0)
+                is_b = 2.0 * vb * factor_shared * p_b[i] > v * factor
+            else:
+                c, cb = evidence(
+                    COLOUR, tables[0], i, colours[i], limits.colours, limits.tolerance, limits.colour_floor
+                )
+                e, eb = evidence(
+                    GRADIENT,
+                    tables[1],
+                    i,
+                    edges[i],
+                    limits.gradients,
+                    limits.tolerance,
+                    limits.gradient_floor,
+                )
+                is_b = 2.0 * cb * factor_shared * eb * factor_shared * p_b[i] > c * factor * e * factor
+        is_background[i] = is_b
         if is_b:
-            red += background[i, 0]
-            green += background[i, 1]
-            blue += background[i, 2]
-            weight = one if changed else limits.image_rate
+            weight = np.float32(1.0) if changed else limits.image_rate
             for c in range(3):
+                before[c] += background[i, c]
                 background[i, c] += weight * (np.float32(pixels[i, c]) - background[i, c])
-            more_red += background[i, 0]
-            more_green += background[i, 1]
-            more_blue += background[i, 2]
-        p_b[i] += rate * ((one if is_b else np.float32(0.0)) - p_b[i])
-        shared_factor = factor
-        if conditional:
-            if is_b:
-                factor_shared[i] *= one - rate
-            shared_factor = factor_shared[i]
-        grow_shared = rate / shared_factor if is_b else np.float32(0.0)
-        learn(COLOUR, colours, i, colour, grow, grow_shared, delta, floor_c)
-        learn(GRADIENT, edges, i, edge, grow, grow_shared, delta, floor_e)
-        learn(PAIR, pairs, i, pair, grow, grow_shared, delta_p, floor_c)
-        if is_b:
-            if conditional and shared_factor < FADED:
-                for table in (colours, edges, pairs):
-                    for k in range(table.shared.shape[0]):
-                        table.shared[k, i] *= shared_factor
-                factor_shared[i] = one
-            continue
-        mask[i] = True
-        count += 1
-        if training or foreign(colours, i, limits.colours, p_b[i], factor, shared_factor) <= limits.once_off:
-            continue
-        turn(colours, i, limits.colours, p_b[i], factor, shared_factor)
-        turn(edges, i, limits.gradients, p_b[i], factor, shared_factor)
-        turn(pairs, i, limits.pairs, p_b[i], factor, shared_factor)
-        p_b[i] = one - p_b[i]
-    light = (
-        more_red / red if red > 0.0 else 1.0,
-        more_green / green if green > 0.0 else 1.0,
-        more_blue / blue if blue > 0.0 else 1.0,
-    )
-    return count, light
+                after[c] += background[i, c]
+    light = np.ones(3, np.float32)
+    for c in range(3):
+        if before[c] > 0.0:
+            light[c] = after[c] / before[c]
+    return is_background, light
+
+
+@njit(cache=True)
+def _turn_once_off(foreground, tables, p_b, factor, factors_shared, limits):  # type: ignore[no-untyped-def]
+    """Make background of what has stayed for long: eqs. (13), (14), judged by colour."""
+    sizes = (limits.colours, limits.gradients, limits.pairs)
+    for i in np.flatnonzero(foreground):
+        factor_shared = factors_shared[i % factors_shared.size]
+        if foreign(tables[0], i, sizes[0], p_b[i], factor, factor_shared) > limits.once_off:
+            for k in range(3):
+                turn(tables[k], i, sizes[k], p_b[i], factor, factor_shared)
+            p_b[i] = np.float32(1.0) - p_b[i]
 
 
 @njit(cache=True)

@@ -104,8 +104,8 @@ def evidence(kind, table, i, feature, first, tolerance, floor):  # type: ignore[
 
 
 @njit(cache=True)
-def learn(kind, table, i, feature, grow, grow_shared, tolerance, floor):  # type: ignore[no-untyped-def]
-    """Count a feature: eqs. (10), (11), after the common factors have faded.
+def learn(kind, table, features, grow, grow_shared, tolerance, floor):  # type: ignore[no-untyped-def]
+    """Count one feature of each pixel: eqs. (10), (11), after the common factors have faded.
 
     Of several identified entries the most frequent grows. An unknown feature takes the last entry's place,
     with p(v|b) = rate only if it was background: as printed, (11) would make any new colour background at
@@ -113,42 +113,38 @@ def learn(kind, table, i, feature, grow, grow_shared, tolerance, floor):  # type
 
     Args:
         kind: COLOUR, GRADIENT or PAIR.
-        table: Of all pixels.
-        i: Pixel.
-        feature: uint32.
-        grow: rate / factor of p(v).
-        grow_shared: rate / factor of p(v|b) if the pixel is background, else 0.
+        table: M >= 2 entries for each of P pixels.
+        features: (P,) uint32.
+        grow: float32, rate / factor of p(v).
+        grow_shared: (P,) float32, rate / factor of p(v|b) where the pixel is background, else 0.
         tolerance: As in `same`.
         floor: As in `same`.
     """
-    if same(kind, table.features[0, i], feature, tolerance, floor):
-        table.seen[0, i] += grow
-        table.shared[0, i] += grow_shared
-        return
-    last = table.features.shape[0] - 1
-    k = 1
-    while True:
-        if table.seen[k, i] == 0.0:
-            known = False
-            break
-        if same(kind, table.features[k, i], feature, tolerance, floor):
-            known = True
-            break
-        if k == last:
-            known = False
-            break
-        k += 1
-    if known:
-        feature = table.features[k, i]
-        seen, shared = table.seen[k, i] + grow, table.shared[k, i] + grow_shared
-    else:
-        seen, shared = grow, grow_shared
-    while k > 0 and table.seen[k - 1, i] <= seen * LATEST:
-        table.features[k, i] = table.features[k - 1, i]
-        table.seen[k, i] = table.seen[k - 1, i]
-        table.shared[k, i] = table.shared[k - 1, i]
-        k -= 1
-    table.features[k, i], table.seen[k, i], table.shared[k, i] = feature, seen, shared
+    entries, frequency, shared_frequency = table.features, table.seen, table.shared
+    last = entries.shape[0] - 1
+    for i in range(features.size):
+        feature = features[i]
+        if same(kind, entries[0, i], feature, tolerance, floor):
+            frequency[0, i] += grow
+            shared_frequency[0, i] += grow_shared[i]
+            continue
+        k, known = 1, False
+        while frequency[k, i] > 0.0:
+            known = same(kind, entries[k, i], feature, tolerance, floor)
+            if known or k == last:
+                break
+            k += 1
+        seen, shared = grow, grow_shared[i]
+        if known:
+            feature = entries[k, i]
+            seen += frequency[k, i]
+            shared += shared_frequency[k, i]
+        while k > 0 and frequency[k - 1, i] <= seen * LATEST:
+            entries[k, i] = entries[k - 1, i]
+            frequency[k, i] = frequency[k - 1, i]
+            shared_frequency[k, i] = shared_frequency[k - 1, i]
+            k -= 1
+        entries[k, i], frequency[k, i], shared_frequency[k, i] = feature, seen, shared
 
 
 @njit(cache=True)

@@ -178,7 +178,8 @@ def test_rarely_visible_background_flips_at_one_half(mode, visible):
         factor *= 1 - rate
         factor_shared *= 1 - rate if is_b or mode is StatMode.JOINT else 1.0
         grow_shared = rate / factor_shared if is_b else 0.0
-        learn(COLOUR, table, 0, a if is_b else b, rate / factor, grow_shared, 0.005, 0.0)
+        seen = np.array([a if is_b else b])
+        learn(COLOUR, table, seen, rate / factor, np.array([grow_shared]), 0.005, 0.0)
     v, vb = evidence(COLOUR, table, 0, a, 5, 0.005, 0.0)
     v, vb = v * factor, vb * factor_shared
     assert abs(v - visible) < 0.04
