@@ -10,15 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple
 
-import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from tracker.motorcycle_lane.change import corner, differences
-from tracker.motorcycle_lane.tables import COLOUR, GRADIENT, PAIR, Table, evidence, foreign, learn, same, turn
+from tracker.motorcycle_lane.change import carry, corner, differences, keep
+from tracker.motorcycle_lane.features import Features, extract
+from tracker.motorcycle_lane.tables import COLOUR, GRADIENT, PAIR, Table, evidence, learn, totals, turn
 
 FADED = np.float32(1e-20)
 """A common factor that has fallen so far is taken into the tables."""
@@ -104,24 +102,6 @@ PAPER = BackgroundParameters(
 """As printed, with OpenCV's values where the paper's are lost."""
 
 
-Features = tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.uint32]]
-
-
-class Limits(NamedTuple):
-    """What the kernel needs of the parameters."""
-
-    colours: int
-    gradients: int
-    pairs: int
-    tolerance: float
-    colour_floor: float
-    gradient_floor: float
-    pair_tolerance: int
-    once_off: np.float32
-    image_rate: np.float32
-    uncovered: bool
-
-
 class BackgroundModel:
     """Background model of one camera.
 
@@ -137,18 +117,6 @@ class BackgroundModel:
             Table.empty(p.colours[1], pixels),
             Table.empty(p.gradients[1], pixels),
             Table.empty(p.pairs[1], pixels),
-        )
-        self._limits = Limits(
-            p.colours[0],
-            p.gradients[0],
-            p.pairs[0],
-            p.tolerance,
-            p.colour_floor,
-            p.gradient_floor,
-            p.pair_tolerance,
-            np.float32(p.once_off),
-            np.float32(p.image_rate),
-            p.uncovered,
         )
         self._background = np.zeros((pixels, 3), np.float32)
         self._previous = np.zeros((pixels, 3), np.uint8)
@@ -196,9 +164,11 @@ class BackgroundModel:
         if image.shape != (*self._shape, 3):
             raise ValueError(f"image is {image.shape}, wanted {(*self._shape, 3)}")
         p = self.parameters
-        pixels = np.ascontiguousarray(image).reshape(-1, 3)
-        previous = pixels if self._frames == 0 else self._previous
-        features = _features(pixels, previous, gradient(image))
+        image = np.ascontiguousarray(image)
+        pixels = image.reshape(-1, 3)
+        if self._frames == 0:
+            self._previous = pixels
+        features = extract(image, self._previous.reshape(image.shape))
         if self._frames == 0:
             self._begin(pixels, features)
             mask = np.zeros(len(pixels), np.bool_)
@@ -220,22 +190,14 @@ class BackgroundModel:
         """Classify a frame, then learn from it; returns the foreground (P,)."""
         p, one = self.parameters, np.float32(1.0)
         far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
-        background, light = _classify(
-            pixels,
-            features,
-            far > corner(far_counts, p.least_change, p.most_change),
-            moved > corner(moved_counts, p.least_change, p.most_change),
-            self._background,
-            self._tables,
-            self._p_b,
-            self._factor,
-            self._factor_shared if self._conditional else np.full(1, self._factor),
-            self.training,
-            self._limits,
-        )
+        is_far = far > corner(far_counts, p.least_change, p.most_change)
+        is_moved = moved > corner(moved_counts, p.least_change, p.most_change)
+        changed = is_far if p.uncovered else is_far | is_moved
+        background = self._classify(features, changed, is_moved)
         foreground = ~background
+        light = keep(self._background, pixels, background, changed, p.image_rate)
         if p.follow_light:
-            _carry(self._background, foreground, light)
+            carry(self._background, foreground, light)
         rate = np.float32(max(p.rate, 1.0 / (self._frames + 1)))
         self._earlier *= one - rate
         self._factor *= one - rate
@@ -255,16 +217,49 @@ class BackgroundModel:
         ):
             learn(kind, table, feature, rate / self._factor, grow_shared, tolerance, floor)
         if not self.training:
-            _turn_once_off(
-                foreground,
-                self._tables,
-                self._p_b,
-                self._factor,
-                self._factor_shared if self._conditional else np.full(1, self._factor),
-                self._limits,
-            )
+            self._turn_once_off(np.flatnonzero(foreground))
         self._take_in()
         return foreground
+
+    def _classify(
+        self, features: Features, changed: NDArray[np.bool_], moved: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Tell what of the changed pixels is background, too: eqs. (4), (7), (15), (16)."""
+        p = self.parameters
+        colours, gradients, pairs = self._tables
+        background = ~changed
+        if self.training:
+            at = np.flatnonzero(changed)
+            seen, _ = evidence(COLOUR, colours, features[0], at, 1, p.tolerance, p.colour_floor)
+            background[at] = seen > 0.0
+            return background
+        at = np.flatnonzero(changed & moved)
+        v, vb = evidence(PAIR, pairs, features[2], at, p.pairs[0], p.pair_tolerance, 0.0)
+        background[at] = 2.0 * vb * self._shared_factors(at) * self._p_b[at] > v * self._factor
+        at = np.flatnonzero(changed & ~moved)
+        c, cb = evidence(COLOUR, colours, features[0], at, p.colours[0], p.tolerance, p.colour_floor)
+        e, eb = evidence(GRADIENT, gradients, features[1], at, p.gradients[0], p.tolerance, p.gradient_floor)
+        shared = self._shared_factors(at)
+        background[at] = 2.0 * cb * shared * eb * shared * self._p_b[at] > c * self._factor * e * self._factor
+        return background
+
+    def _turn_once_off(self, at: NDArray[np.int64]) -> None:
+        """Make background of what has stayed for long: eqs. (13), (14), judged by colour.
+
+        Args:
+            at: Pixels that are foreground.
+        """
+        p = self.parameters
+        seen, shared = totals(self._tables[0], at, p.colours[0])
+        foreign = seen * self._factor - self._p_b[at] * shared * self._shared_factors(at)
+        at = at[foreign > p.once_off]
+        for table, (used, _) in zip(self._tables, (p.colours, p.gradients, p.pairs), strict=True):
+            turn(table, at, used, self._p_b[at], self._factor, self._shared_factors(at))
+        self._p_b[at] = 1.0 - self._p_b[at]
+
+    def _shared_factors(self, at: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Return the common factor of p(v|b) of some pixels."""
+        return self._factor_shared[at] if self._conditional else np.full(len(at), self._factor)
 
     def _begin(self, pixels: NDArray[np.uint8], features: Features) -> None:
         """Take a frame for background, the only thing that each pixel has ever shown."""
@@ -311,110 +306,3 @@ class BackgroundModel:
             for table in self._tables:
                 table.shared[:, faded] *= self._factor_shared[faded]
             self._factor_shared[faded] = 1.0
-
-
-def gradient(image: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Return (P,) gradients of the grey image: 256 levels each of x (low byte) and y, 128 is none."""
-    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-    along = cv2.Sobel(grey, cv2.CV_16S, 1, 0, ksize=3)
-    across = cv2.Sobel(grey, cv2.CV_16S, 0, 1, ksize=3)
-    return np.asarray((along.ravel() // 8 + 128) | (across.ravel() // 8 + 128) << 8).view(np.uint16)
-
-
-@njit(cache=True)
-def _colour(pixels, i):  # type: ignore[no-untyped-def]
-    return (np.uint32(pixels[i, 0]) << 16) | (np.uint32(pixels[i, 1]) << 8) | np.uint32(pixels[i, 2])
-
-
-@njit(cache=True)
-def _coarse(colour):  # type: ignore[no-untyped-def]
-    """Return a colour in 32 levels a channel, 15 bits."""
-    return ((colour >> 9) & 0x7C00) | ((colour >> 6) & 0x3E0) | ((colour >> 3) & 0x1F)
-
-
-@njit(cache=True)
-def _features(pixels, previous, gradients):  # type: ignore[no-untyped-def]
-    """Return the colours, gradients and pairs of colours of all pixels, (P,) uint32 each, packed."""
-    count = pixels.shape[0]
-    colours, edges, pairs = (
-        np.empty(count, np.uint32),
-        np.empty(count, np.uint32),
-        np.empty(count, np.uint32),
-    )
-    for i in range(count):
-        colours[i] = _colour(pixels, i)
-        edges[i] = gradients[i]
-        pairs[i] = (_coarse(_colour(previous, i)) << 15) | _coarse(_colour(pixels, i))
-    return colours, edges, pairs
-
-
-@njit(cache=True)
-def _classify(  # type: ignore[no-untyped-def]
-    pixels, features, far, moved, background, tables, p_b, factor, factors_shared, training, limits
-):
-    """Tell background from foreground: eqs. (4), (7); and keep the background image: eqs. (17), (18).
-
-    Returns (P,) bool, and by what factor each channel of the background that is seen grew.
-    """
-    colours, edges, pairs = features
-    is_background = np.empty(colours.size, np.bool_)
-    before, after = np.zeros(3), np.zeros(3)
-    for i in range(colours.size):
-        changed = far[i] or (moved[i] and not limits.uncovered)
-        is_b = True
-        if changed:
-            factor_shared = factors_shared[i % factors_shared.size]
-            if training:
-                is_b = same(
-                    COLOUR, tables[0].features[0, i], colours[i], limits.tolerance, limits.colour_floor
-                )
-            elif moved[i]:
-                v, vb = evidence(PAIR, tables[2], i, pairs[i], limits.pairs, limits.pair_tolerance, 0.0)
-                is_b = 2.0 * vb * factor_shared * p_b[i] > v * factor
-            else:
-                c, cb = evidence(
-                    COLOUR, tables[0], i, colours[i], limits.colours, limits.tolerance, limits.colour_floor
-                )
-                e, eb = evidence(
-                    GRADIENT,
-                    tables[1],
-                    i,
-                    edges[i],
-                    limits.gradients,
-                    limits.tolerance,
-                    limits.gradient_floor,
-                )
-                is_b = 2.0 * cb * factor_shared * eb * factor_shared * p_b[i] > c * factor * e * factor
-        is_background[i] = is_b
-        if is_b:
-            weight = np.float32(1.0) if changed else limits.image_rate
-            for c in range(3):
-                before[c] += background[i, c]
-                background[i, c] += weight * (np.float32(pixels[i, c]) - background[i, c])
-                after[c] += background[i, c]
-    light = np.ones(3, np.float32)
-    for c in range(3):
-        if before[c] > 0.0:
-            light[c] = after[c] / before[c]
-    return is_background, light
-
-
-@njit(cache=True)
-def _turn_once_off(foreground, tables, p_b, factor, factors_shared, limits):  # type: ignore[no-untyped-def]
-    """Make background of what has stayed for long: eqs. (13), (14), judged by colour."""
-    sizes = (limits.colours, limits.gradients, limits.pairs)
-    for i in np.flatnonzero(foreground):
-        factor_shared = factors_shared[i % factors_shared.size]
-        if foreign(tables[0], i, sizes[0], p_b[i], factor, factor_shared) > limits.once_off:
-            for k in range(3):
-                turn(tables[k], i, sizes[k], p_b[i], factor, factor_shared)
-            p_b[i] = np.float32(1.0) - p_b[i]
-
-
-@njit(cache=True)
-def _carry(background, mask, light):  # type: ignore[no-untyped-def]
-    """Let the background behind the foreground follow the light of what is seen."""
-    for i in range(mask.size):
-        if mask[i]:
-            for c in range(3):
-                background[i, c] = min(background[i, c] * light[c], np.float32(255.0))

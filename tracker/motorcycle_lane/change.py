@@ -1,8 +1,8 @@
-"""Where a frame differs from the background and from the frame before, with thresholds found in the frame.
+"""Where a frame differs from the background image and from the frame before, and the upkeep of that image.
 
-Paper 3, section II.D.1; the threshold is the corner of the histogram of differences (Rosin, Unimodal
-thresholding, Pattern Recognition 34, 2001): nearly all pixels only carry noise, and the corner is where
-their peak ends and the tail of changed ones begins.
+Paper 3, sections II.D.1 and II.E. The threshold is the corner of the histogram of differences (Rosin,
+Unimodal thresholding, Pattern Recognition 34, 2001): nearly all pixels only carry noise, and the corner is
+where their peak ends and the tail of changed ones begins.
 """
 
 from __future__ import annotations
@@ -60,3 +60,51 @@ def corner(counts: NDArray[np.int64], least: int, most: int) -> int:
     bins = np.arange(peak, last + 1)
     below = (counts[peak] - counts[bins]) * (last - peak) - (counts[peak] - counts[last]) * (bins - peak)
     return int(np.clip(peak + np.argmax(below), least, most))
+
+
+@njit(cache=True)
+def keep(background, image, is_background, changed, rate):  # type: ignore[no-untyped-def]
+    """Keep the background image up to date, in place: eqs. (17), (18).
+
+    Args:
+        background: (P, 3) float32.
+        image: (P, 3) uint8.
+        is_background: (P,) bool.
+        changed: (P,) bool; where it has, the background becomes the image at once.
+        rate: beta.
+
+    Returns:
+        (3,) factor by which each channel of the background that is seen grew.
+    """
+    red, green, blue, red_after, green_after, blue_after = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(is_background.size):
+        if is_background[i]:
+            red += background[i, 0]
+            green += background[i, 1]
+            blue += background[i, 2]
+            weight = np.float32(1.0 if changed[i] else rate)
+            for c in range(3):
+                background[i, c] += weight * (np.float32(image[i, c]) - background[i, c])
+            red_after += background[i, 0]
+            green_after += background[i, 1]
+            blue_after += background[i, 2]
+    light = np.ones(3, np.float32)
+    for c, before, after in ((0, red, red_after), (1, green, green_after), (2, blue, blue_after)):
+        if before > 0.0:
+            light[c] = after / before
+    return light
+
+
+@njit(cache=True)
+def carry(background, foreground, light):  # type: ignore[no-untyped-def]
+    """Let the background behind the foreground follow the light of what is seen, in place.
+
+    Args:
+        background: (P, 3) float32.
+        foreground: (P,) bool.
+        light: (3,) as from `keep`.
+    """
+    for i in range(foreground.size):
+        if foreground[i]:
+            for c in range(3):
+                background[i, c] = min(background[i, c] * light[c], np.float32(255.0))

@@ -91,15 +91,45 @@ def same(kind, a, b, tolerance, floor):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def evidence(kind, table, i, feature, first, tolerance, floor):  # type: ignore[no-untyped-def]
-    """Sum p(v) and p(v|b) over the first N entries that are identified with a feature: eqs. (15), (16)."""
-    seen, shared = np.float32(0.0), np.float32(0.0)
-    for k in range(first):
-        if table.seen[k, i] == 0.0:
-            break
-        if same(kind, table.features[k, i], feature, tolerance, floor):
-            seen += table.seen[k, i]
-            shared += table.shared[k, i]
+def evidence(kind, table, features, at, first, tolerance, floor):  # type: ignore[no-untyped-def]
+    """Sum p(v) and p(v|b) over the first N entries that are identified with a feature: eqs. (15), (16).
+
+    Args:
+        kind: COLOUR, GRADIENT or PAIR.
+        table: Of P pixels.
+        features: (P,) uint32.
+        at: (K,) the pixels asked for.
+        first: N.
+        tolerance: As in `same`.
+        floor: As in `same`.
+
+    Returns:
+        Two (K,) float32, both without their common factors.
+    """
+    entries, frequency, shared_frequency = table.features, table.seen, table.shared
+    seen, shared = np.zeros(at.size, np.float32), np.zeros(at.size, np.float32)
+    for a in range(at.size):
+        i = at[a]
+        for k in range(first):
+            if frequency[k, i] == 0.0:
+                break
+            if same(kind, entries[k, i], features[i], tolerance, floor):
+                seen[a] += frequency[k, i]
+                shared[a] += shared_frequency[k, i]
+    return seen, shared
+
+
+@njit(cache=True)
+def totals(table, at, first):  # type: ignore[no-untyped-def]
+    """Sum p(v) and p(v|b) over all of the first N entries of pixels ``at``; two (K,) as in `evidence`."""
+    frequency, shared_frequency = table.seen, table.shared
+    seen, shared = np.zeros(at.size, np.float32), np.zeros(at.size, np.float32)
+    for a in range(at.size):
+        for k in range(first):
+            if frequency[k, at[a]] == 0.0:
+                break
+            seen[a] += frequency[k, at[a]]
+            shared[a] += shared_frequency[k, at[a]]
     return seen, shared
 
 
@@ -148,28 +178,26 @@ def learn(kind, table, features, grow, grow_shared, tolerance, floor):  # type: 
 
 
 @njit(cache=True)
-def foreign(table, i, first, p_b, factor, factor_shared):  # type: ignore[no-untyped-def]
-    """Return how much of what a pixel shows is frequent but not background: the left side of eq. (13)."""
-    seen, shared = np.float32(0.0), np.float32(0.0)
-    for k in range(first):
-        if table.seen[k, i] == 0.0:
-            break
-        seen += table.seen[k, i]
-        shared += table.shared[k, i]
-    return seen * factor - p_b * shared * factor_shared
-
-
-@njit(cache=True)
-def turn(table, i, first, p_b, factor, factor_shared):  # type: ignore[no-untyped-def]
-    """Make what was foreground background: eq. (14), with p(b) from before.
+def turn(table, at, first, p_b, factor, factors_shared):  # type: ignore[no-untyped-def]
+    """Make what was foreground background: eq. (14).
 
     What was background by eq. (4) stays so, as it is: as printed it would turn into foreground, and be a
     ghost for as long again when what has been absorbed leaves.
+
+    Args:
+        table: Of P pixels.
+        at: (K,) the pixels to turn.
+        first: N.
+        p_b: (K,) their p(b) before.
+        factor: Common factor of p(v).
+        factors_shared: (K,) common factor of p(v|b).
     """
-    for k in range(first):
-        if table.seen[k, i] == 0.0:
-            break
-        seen, shared = table.seen[k, i] * factor, table.shared[k, i] * factor_shared
-        if 2.0 * shared * p_b > seen:
-            continue
-        table.shared[k, i] = (seen - p_b * shared) / ((np.float32(1.0) - p_b) * factor_shared)
+    frequency, shared_frequency = table.seen, table.shared
+    for a in range(at.size):
+        i, others = at[a], np.float32(1.0) - p_b[a]
+        for k in range(first):
+            if frequency[k, i] == 0.0:
+                break
+            seen, shared = frequency[k, i] * factor, shared_frequency[k, i] * factors_shared[a]
+            if 2.0 * shared * p_b[a] <= seen:
+                shared_frequency[k, i] = (seen - p_b[a] * shared) / (others * factors_shared[a])

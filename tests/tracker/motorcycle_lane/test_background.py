@@ -180,8 +180,8 @@ def test_rarely_visible_background_flips_at_one_half(mode, visible):
         grow_shared = rate / factor_shared if is_b else 0.0
         seen = np.array([a if is_b else b])
         learn(COLOUR, table, seen, rate / factor, np.array([grow_shared]), 0.005, 0.0)
-    v, vb = evidence(COLOUR, table, 0, a, 5, 0.005, 0.0)
-    v, vb = v * factor, vb * factor_shared
+    found = evidence(COLOUR, table, np.array([a]), np.zeros(1, np.int64), 5, 0.005, 0.0)
+    v, vb = found[0][0] * factor, found[1][0] * factor_shared
     assert abs(v - visible) < 0.04
     assert abs(vb - (visible if mode is StatMode.JOINT else 1.0)) < 0.04
     assert (2 * vb * p_b > v) == (visible > 0.5 if mode is StatMode.JOINT else True)
