@@ -90,6 +90,12 @@ class BackgroundParameters:
     follow_light: bool = True
     uncovered: bool = True
 
+    def __post_init__(self) -> None:
+        for name in ("colours", "gradients", "pairs"):
+            used, kept = getattr(self, name)
+            if not (1 <= used <= kept and kept >= 2):
+                raise ValueError(f"{name} is {(used, kept)}, wanted N, M with 1 <= N <= M and M >= 2")
+
 
 PAPER = BackgroundParameters(
     mode=StatMode.JOINT,

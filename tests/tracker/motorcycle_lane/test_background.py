@@ -250,6 +250,12 @@ def test_long_runs_do_not_run_out_of_numbers():
             assert table[:, 0].sum() <= 1 + 1e-3
 
 
+@pytest.mark.parametrize("sizes", [(1, 1), (5, 4), (0, 3)])
+def test_tables_that_cannot_be(sizes):
+    with pytest.raises(ValueError, match="pairs is"):
+        BackgroundParameters(pairs=sizes)
+
+
 def test_image_of_another_size():
     with pytest.raises(ValueError, match="wanted"):
         BackgroundModel(4, 4).apply(np.zeros((3, 4, 3), np.uint8))
