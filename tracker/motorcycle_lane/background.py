@@ -270,7 +270,7 @@ class BackgroundModel:
     def _begin(self, pixels: NDArray[np.uint8], features: Features) -> None:
         """Take a frame for background, the only thing that each pixel has ever shown."""
         for table, feature in zip(self._tables, features, strict=True):
-            table.seen[:] = 0.0
+            table.seen[: table.used] = 0.0
             table.features[0] = feature
             table.seen[0] = table.shared[0] = 1.0
         self._background[:] = pixels
@@ -281,7 +281,7 @@ class BackgroundModel:
     def _begin_background(self) -> None:
         """Forget what went for background so far: only now is it known what each pixel shows most often."""
         for table in self._tables:
-            table.shared[:] = 0.0
+            table.shared[: table.used] = 0.0
         self._p_b[:] = 0.0
         self._earlier = np.float32(1.0)
 
@@ -291,24 +291,25 @@ class BackgroundModel:
         self._p_b /= share
         if self.parameters.mode is StatMode.JOINT:
             for table in self._tables:
-                table.shared[:] /= share
+                table.shared[: table.used] /= share
             return
         self._conditional = True
         self._factor_shared[:] = 1.0
         scale = self._factor / (share * np.maximum(self._p_b, np.float32(1e-6)))
         for table in self._tables:
-            table.shared[:] *= scale
+            table.shared[: table.used] *= scale
 
     def _take_in(self) -> None:
         """Take common factors that have become small into the tables, and begin them again."""
         if self._factor < FADED:
             for table in self._tables:
-                table.seen[:] *= self._factor
+                used = table.used
+                table.seen[:used] *= self._factor
                 if not self._conditional:
-                    table.shared[:] *= self._factor
+                    table.shared[:used] *= self._factor
             self._factor = np.float32(1.0)
         if self._conditional and self._factor_shared.min() < FADED:
             faded = np.flatnonzero(self._factor_shared < FADED)
             for table in self._tables:
-                table.shared[:, faded] *= self._factor_shared[faded]
+                table.shared[: table.used, faded] *= self._factor_shared[faded]
             self._factor_shared[faded] = 1.0

@@ -47,6 +47,11 @@ class Table(NamedTuple):
         shape = entries, pixels
         return cls(np.zeros(shape, np.uint32), np.zeros(shape, np.float32), np.zeros(shape, np.float32))
 
+    @property
+    def used(self) -> int:
+        """How many entries the fullest pixel has; the memory beyond has not been touched."""
+        return next((k for k, entry in enumerate(self.seen) if not entry.any()), len(self.seen))
+
 
 @njit(cache=True)
 def _near(a, b, tolerance):  # type: ignore[no-untyped-def]
