@@ -2,13 +2,13 @@
 
 import os
 
-from tests.benchmarks import episode, render, tracker, traffic
+from tests.benchmarks import background, episode, jpda, render, tracker, traffic
 from tests.benchmarks.lines import table
 
 if __name__ == "__main__":
     lines = []
     before = os.getloadavg()[0]
-    for benchmark in (traffic, render, tracker, episode):
+    for benchmark in (traffic, render, tracker, episode, background, jpda):
         print(f"\n## {benchmark.__name__.rsplit('.', 1)[-1]}", flush=True)
         lines += benchmark.main()
     print(f"\n## all\n{table(lines)}")

@@ -1,0 +1,197 @@
+"""The background model written down plainly: every value fades in every frame, float64, pixel by pixel."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from tracker.motorcycle_lane.background import StatMode
+
+
+class PlainTable:
+    """Entries [p(v), p(v|b), feature], most frequent first."""
+
+    def __init__(self, sizes, same):
+        self.used, self.kept = sizes
+        self.same = same
+        self.entries = []
+
+    def evidence(self, feature):
+        matching = [e for e in self.entries[: self.used] if self.same(e[2], feature)]
+        return sum(e[0] for e in matching), sum(e[1] for e in matching)
+
+    def learn(self, feature, is_b, rate, mode):
+        for entry in self.entries:
+            entry[0] *= 1 - rate
+            if mode is StatMode.JOINT or is_b:
+                entry[1] *= 1 - rate
+        known = [k for k, e in enumerate(self.entries) if self.same(e[2], feature)]
+        if known:
+            entry = self.entries.pop(known[0])
+        else:
+            del self.entries[self.kept - 1 :]
+            entry = [0.0, 0.0, feature]
+        entry[0] += rate
+        entry[1] += rate * is_b
+        # Of equals the latest comes first.
+        above = known[0] if known else len(self.entries)
+        while above and self.entries[above - 1][0] <= entry[0] * 1.0001:
+            above -= 1
+        self.entries.insert(above, entry)
+
+
+def vector_same(tolerance, floor):
+    def same(a, b):
+        a, b = np.array(a, float), np.array(b, float)
+        return ((a - b) ** 2).sum() <= max(tolerance * ((a**2).sum() + (b**2).sum()), floor**2)
+
+    return same
+
+
+def pair_same(tolerance):
+    return lambda a, b: max(abs(p - q) for p, q in zip(a, b, strict=True)) <= tolerance
+
+
+def sobel(grey):
+    """Quantised gradients (H, W, 2), edges mirrored without the edge itself."""
+    wide = np.pad(grey.astype(int), 1, mode="reflect")
+    smooth = wide[:-2] + 2 * wide[1:-1] + wide[2:]
+    along = smooth[:, 2:] - smooth[:, :-2]
+    smooth = wide[:, :-2] + 2 * wide[:, 1:-1] + wide[:, 2:]
+    across = smooth[2:] - smooth[:-2]
+    return np.stack([along // 8, across // 8], -1)
+
+
+def plain_corner(counts, least, most):
+    """The largest bin gap below the line from the peak to the last bin in use."""
+    peak = max(range(most + 1), key=lambda k: (counts[k], -k))
+    last = max(k for k in range(256) if counts[k])
+    if last <= peak:
+        return least
+    gaps = [
+        Fraction(int(counts[peak] * (last - k) + counts[last] * (k - peak)), last - peak) - int(counts[k])
+        for k in range(peak, last + 1)
+    ]
+    return min(max(peak + gaps.index(max(gaps)), least), most)
+
+
+class PlainModel:
+    """What `tracker.motorcycle_lane.background.BackgroundModel` is, slowly."""
+
+    def __init__(self, width, height, parameters):
+        self.parameters = p = parameters
+        self.shape = height, width
+        self.tables = [
+            [
+                (
+                    PlainTable(p.colours, vector_same(p.tolerance, p.colour_floor)),
+                    PlainTable(p.gradients, vector_same(p.tolerance, p.gradient_floor)),
+                    PlainTable(p.pairs, pair_same(p.pair_tolerance)),
+                )
+                for _ in range(width)
+            ]
+            for _ in range(height)
+        ]
+        self.p_b = np.ones(self.shape)
+        self.background = self.previous = None
+        self.frames = self.flashing = 0
+
+    def apply(self, image, grey):
+        p = self.parameters
+        edges = sobel(grey)
+        mask = np.zeros(self.shape, bool)
+        if self.frames == 0:
+            self.background = image.astype(float)
+            self.previous = image
+            self.p_b[:] = 1
+            self.clear(lambda table: table.entries.clear())
+            self.earlier = 0.0
+            for at in np.ndindex(self.shape):
+                for table, feature in zip(
+                    self.tables[at[0]][at[1]], self.features(image, edges, at), strict=True
+                ):
+                    table.learn(feature, True, 1.0, p.mode)
+            self.frames = 1
+            return mask
+        far = np.floor(np.abs(image - self.background).max(-1) + 0.5).astype(int)
+        moved = np.abs(image.astype(int) - self.previous).max(-1)
+        far, moved = (
+            d > plain_corner(np.bincount(d.ravel(), minlength=256), p.least_change, p.most_change)
+            for d in (far, moved)
+        )
+        training = self.frames < p.start_frames
+        if self.frames == p.start_frames // 2:
+            # Only now is it known what each pixel shows most often.
+            self.clear(lambda table: [entry.__setitem__(1, 0.0) for entry in table.entries])
+            self.p_b[:] = 0
+            self.earlier = 1.0
+        if self.frames == p.start_frames:
+            self.settle()
+        rate = max(p.rate, 1 / (self.frames + 1))
+        self.earlier *= 1 - rate
+        before = self.background.copy()
+        for at in np.ndindex(self.shape):
+            features = self.features(image, edges, at)
+            mask[at] = not self.pixel(at, image, features, far[at], moved[at], training, rate)
+        seen = ~mask
+        if p.follow_light and seen.any():
+            sums, old = self.background[seen].sum(0), before[seen].sum(0)
+            growth = np.where(old > 0, sums / np.maximum(old, 1e-9), 1)
+            self.background[mask] = np.minimum(self.background[mask] * growth, 255)
+        self.flashing = self.flashing + 1 if mask.mean() > p.flash_share and not training else 0
+        self.frames += 1
+        self.previous = image
+        if self.flashing == p.flash_frames:
+            self.flashing = self.frames = 0
+        return mask
+
+    def clear(self, what):
+        for at in np.ndindex(self.shape):
+            for table in self.tables[at[0]][at[1]]:
+                what(table)
+
+    def settle(self):
+        self.p_b /= 1 - self.earlier
+        for at in np.ndindex(self.shape):
+            for table in self.tables[at[0]][at[1]]:
+                for entry in table.entries:
+                    entry[1] /= 1 - self.earlier
+                    if self.parameters.mode is StatMode.CONDITIONAL and self.p_b[at]:
+                        entry[1] /= self.p_b[at]
+
+    def features(self, image, edges, at):
+        now = tuple(int(v) for v in image[at])
+        last = tuple(int(v) for v in self.previous[at])
+        return now, tuple(edges[at]), tuple(v // 8 for v in last + now)
+
+    def pixel(self, at, image, features, far, moved, training, rate):
+        """Classify and learn; returns whether the pixel is background."""
+        p = self.parameters
+        tables, p_b = self.tables[at[0]][at[1]], self.p_b[at]
+        moved = moved and (far or not p.uncovered)
+        if not far and not moved:
+            is_b = True
+        elif training:
+            is_b = tables[0].same(tables[0].entries[0][2], features[0])
+        elif moved:
+            v, vb = tables[2].evidence(features[2])
+            is_b = 2 * vb * p_b > v
+        else:
+            (c, cb), (e, eb) = tables[0].evidence(features[0]), tables[1].evidence(features[1])
+            is_b = 2 * cb * eb * p_b > c * e
+        if not far and not moved:
+            self.background[at] += p.image_rate * (image[at] - self.background[at])
+        elif is_b:
+            self.background[at] = image[at]
+        self.p_b[at] = p_b = p_b + rate * (is_b - p_b)
+        for table, feature in zip(tables, features, strict=True):
+            table.learn(feature, is_b, rate, StatMode.JOINT if training else p.mode)
+        seen, shared = (sum(e[k] for e in tables[0].entries[: tables[0].used]) for k in (0, 1))
+        if not is_b and not training and seen - p_b * shared > p.once_off:
+            for table in tables:
+                for entry in table.entries[: table.used]:
+                    if 2 * entry[1] * p_b <= entry[0]:
+                        entry[1] = (entry[0] - p_b * entry[1]) / (1 - p_b)
+            self.p_b[at] = 1 - p_b
+        return is_b

@@ -1,0 +1,315 @@
+"""Statistical background model: Li, Huang, Gu, Tian, TIP 13(11), 2004; eqs. (1)-(18) of paper 3.
+
+Each pixel learns how often it shows which colour, gradient and pair of successive colours, and how often as
+background. A pixel that differs neither from the background image nor from the frame before is background;
+one that keeps still is judged by colour and gradient, eq. (7), one that moves by its pair of colours,
+eq. (4). What stays for long becomes background at once, eqs. (12)-(14).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.motorcycle_lane.change import carry, corner, differences, keep
+from tracker.motorcycle_lane.features import Features, extract
+from tracker.motorcycle_lane.tables import COLOUR, GRADIENT, PAIR, Table, evidence, learn, totals, turn
+
+FADED = np.float32(1e-20)
+"""A common factor that has fallen so far is taken into the tables."""
+
+
+class StatMode(StrEnum):
+    """What p(v|b) in the tables is.
+
+    Attributes:
+        JOINT: As (10) is printed it fades in every frame and becomes P(v and b): a colour is background only
+            where the background is seen more than half of the time.
+        CONDITIONAL: It fades and grows only in frames where the pixel is background: P(v|b) proper. Needed
+            where traffic is dense; what is left behind is absorbed half as fast.
+    """
+
+    JOINT = "joint"
+    CONDITIONAL = "conditional"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BackgroundParameters:
+    """Parameters of the background model.
+
+    Attributes:
+        mode: Reading of the statistics.
+        rate: alpha. Raising it absorbs stopped objects sooner and forgets rare background sooner.
+        start_frames: Frames of training, in which a pixel is background if it shows its most frequent colour.
+            Raising it learns through denser traffic, and takes longer. The first 1 / alpha frames all weigh
+            the same, so alpha begins at 1 and is a thirtieth after 30 frames.
+        image_rate: beta of the background image. Raising it follows the light faster, and noise too.
+        colours: N, M of the colour table: entries used, and kept. Raising them holds rarer background.
+        gradients: N, M of the gradient table.
+        pairs: N, M of the table of colour pairs.
+        tolerance: delta of eq. (8), for colours and gradients. Raising it takes larger changes of brightness
+            for the same feature, and pale objects for background.
+        colour_floor: Distance of two colours, grey levels, that is only noise. Raising it makes dark pixels
+            as tolerant as bright ones.
+        gradient_floor: tau_e: distance of two gradients, in levels of 8 Sobel units, that is only noise; two
+            or three standard deviations. Raising it ignores weak texture.
+        pair_tolerance: delta of eq. (9), of 32 levels.
+        once_off: M of eq. (13). Raising it absorbs stopped objects later.
+        least_change: Grey levels that are always noise. Raising it loses pale objects, lowering it sends
+            noisy pixels through the tables, which takes time.
+        most_change: Grey levels that never are noise.
+        flash_share: Share of foreground pixels from which the light must have changed. Raising it withstands
+            denser traffic.
+        flash_frames: Successive frames of such a share before all is learnt anew.
+        follow_light: Whether the background image behind foreground follows the light of the rest, so it
+            fits when it is seen again.
+        uncovered: Whether a pixel that moved and now equals the background image is background, whatever its
+            pair of colours. As printed the pair decides, and the strip that an object has just uncovered is
+            foreground.
+    """
+
+    mode: StatMode = StatMode.CONDITIONAL
+    rate: float = 0.005
+    start_frames: int = 30
+    image_rate: float = 0.1
+    colours: tuple[int, int] = (15, 25)
+    gradients: tuple[int, int] = (15, 25)
+    pairs: tuple[int, int] = (25, 40)
+    tolerance: float = 0.01
+    colour_floor: float = 15.0
+    gradient_floor: float = 8.0
+    pair_tolerance: int = 2
+    once_off: float = 0.85
+    least_change: int = 15
+    most_change: int = 30
+    flash_share: float = 0.5
+    flash_frames: int = 3
+    follow_light: bool = True
+    uncovered: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("colours", "gradients", "pairs"):
+            used, kept = getattr(self, name)
+            if not (1 <= used <= kept and kept >= 2):
+                raise ValueError(f"{name} is {(used, kept)}, wanted N, M with 1 <= N <= M and M >= 2")
+
+
+PAPER = BackgroundParameters(
+    mode=StatMode.JOINT,
+    tolerance=0.005,
+    colour_floor=0.0,
+    least_change=10,
+    follow_light=False,
+    uncovered=False,
+)
+"""As printed, with OpenCV's values where the paper's are lost."""
+
+
+class BackgroundModel:
+    """Background model of one camera.
+
+    Attributes:
+        parameters: As given.
+    """
+
+    def __init__(self, width: int, height: int, parameters: BackgroundParameters | None = None) -> None:
+        self.parameters = p = BackgroundParameters() if parameters is None else parameters
+        self._shape = height, width
+        pixels = height * width
+        self._tables = (
+            Table.empty(p.colours[1], pixels),
+            Table.empty(p.gradients[1], pixels),
+            Table.empty(p.pairs[1], pixels),
+        )
+        self._background = np.zeros((pixels, 3), np.float32)
+        self._previous = np.zeros((pixels, 3), np.uint8)
+        # p(b) of each pixel: one for all tables, since all learn from the same frames.
+        self._p_b = np.zeros(pixels, np.float32)
+        self._factor = np.float32(1.0)
+        self._factor_shared = np.ones(pixels, np.float32)
+        # Whether p(v|b) has a factor of its own, by pixel: in conditional mode once the training is over.
+        self._conditional = False
+        # Weight of what came before p(v|b) and p(b) were last begun.
+        self._earlier = np.float32(0.0)
+        self._frames = 0
+        self._flashing = 0
+
+    @property
+    def background(self) -> NDArray[np.uint8]:
+        """The background image, (H, W, 3) RGB."""
+        return np.asarray(self._background.round().astype(np.uint8).reshape(*self._shape, 3))
+
+    @property
+    def training(self) -> bool:
+        """Whether the next frame belongs to the training."""
+        return self._frames < self.parameters.start_frames
+
+    def statistics(self, row: int, column: int) -> tuple[NDArray[np.float64], ...]:
+        """Return what a pixel has learnt: (K, 2) p(v) and p(v|b) of colours, gradients and pairs."""
+        i = row * self._shape[1] + column
+        shared = self._factor_shared[i] if self._conditional else self._factor
+        factors = np.array([self._factor, shared], np.float64)
+        both = (np.stack([table.seen[:, i], table.shared[:, i]], 1) for table in self._tables)
+        return tuple(factors * values[values[:, 0] > 0] for values in both)
+
+    def apply(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Classify and learn one frame.
+
+        Args:
+            image: (H, W, 3) uint8 RGB.
+
+        Returns:
+            (H, W) foreground, raw: see `tracker.motorcycle_lane.blobs.clean`.
+
+        Raises:
+            ValueError: If the image has another size than the model.
+        """
+        if image.shape != (*self._shape, 3):
+            raise ValueError(f"image is {image.shape}, wanted {(*self._shape, 3)}")
+        p = self.parameters
+        image = np.ascontiguousarray(image)
+        pixels = image.reshape(-1, 3)
+        if self._frames == 0:
+            self._previous = pixels
+        features = extract(image, self._previous.reshape(image.shape))
+        if self._frames == 0:
+            self._begin(pixels, features)
+            mask = np.zeros(len(pixels), np.bool_)
+        else:
+            if self._frames == p.start_frames // 2:
+                self._begin_background()
+            if self._frames == p.start_frames:
+                self._settle()
+            mask = self._step(pixels, features)
+            flash = mask.mean() > p.flash_share and not self.training
+            self._flashing = self._flashing + 1 if flash else 0
+        self._previous = pixels.copy()
+        self._frames += 1
+        if self._flashing == p.flash_frames:
+            self._frames = self._flashing = 0
+        return mask.reshape(self._shape)
+
+    def _step(self, pixels: NDArray[np.uint8], features: Features) -> NDArray[np.bool_]:
+        """Classify a frame, then learn from it; returns the foreground (P,)."""
+        p, one = self.parameters, np.float32(1.0)
+        far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
+        is_far = far > corner(far_counts, p.least_change, p.most_change)
+        is_moved = moved > corner(moved_counts, p.least_change, p.most_change)
+        changed = is_far if p.uncovered else is_far | is_moved
+        background = self._classify(features, changed, is_moved)
+        foreground = ~background
+        light = keep(self._background, pixels, background, changed, p.image_rate)
+        if p.follow_light:
+            carry(self._background, foreground, light)
+        rate = np.float32(max(p.rate, 1.0 / (self._frames + 1)))
+        self._earlier *= one - rate
+        self._factor *= one - rate
+        self._p_b += rate * (background - self._p_b)
+        if self._conditional:
+            self._factor_shared[background] *= one - rate
+            grow_shared = background * (rate / self._factor_shared)
+        else:
+            grow_shared = background * (rate / self._factor)
+        for kind, table, feature, tolerance, floor in zip(
+            (COLOUR, GRADIENT, PAIR),
+            self._tables,
+            features,
+            (p.tolerance, p.tolerance, p.pair_tolerance),
+            (p.colour_floor, p.gradient_floor, 0.0),
+            strict=True,
+        ):
+            learn(kind, table, feature, rate / self._factor, grow_shared, tolerance, floor)
+        if not self.training:
+            self._turn_once_off(np.flatnonzero(foreground))
+        self._take_in()
+        return foreground
+
+    def _classify(
+        self, features: Features, changed: NDArray[np.bool_], moved: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Tell what of the changed pixels is background, too: eqs. (4), (7), (15), (16)."""
+        p = self.parameters
+        colours, gradients, pairs = self._tables
+        background = ~changed
+        if self.training:
+            at = np.flatnonzero(changed)
+            seen, _ = evidence(COLOUR, colours, features[0], at, 1, p.tolerance, p.colour_floor)
+            background[at] = seen > 0.0
+            return background
+        at = np.flatnonzero(changed & moved)
+        v, vb = evidence(PAIR, pairs, features[2], at, p.pairs[0], p.pair_tolerance, 0.0)
+        background[at] = 2.0 * vb * self._shared_factors(at) * self._p_b[at] > v * self._factor
+        at = np.flatnonzero(changed & ~moved)
+        c, cb = evidence(COLOUR, colours, features[0], at, p.colours[0], p.tolerance, p.colour_floor)
+        e, eb = evidence(GRADIENT, gradients, features[1], at, p.gradients[0], p.tolerance, p.gradient_floor)
+        shared = self._shared_factors(at)
+        background[at] = 2.0 * cb * shared * eb * shared * self._p_b[at] > c * self._factor * e * self._factor
+        return background
+
+    def _turn_once_off(self, at: NDArray[np.int64]) -> None:
+        """Make background of what has stayed for long: eqs. (13), (14), judged by colour.
+
+        Args:
+            at: Pixels that are foreground.
+        """
+        p = self.parameters
+        seen, shared = totals(self._tables[0], at, p.colours[0])
+        foreign = seen * self._factor - self._p_b[at] * shared * self._shared_factors(at)
+        at = at[foreign > p.once_off]
+        for table, (used, _) in zip(self._tables, (p.colours, p.gradients, p.pairs), strict=True):
+            turn(table, at, used, self._p_b[at], self._factor, self._shared_factors(at))
+        self._p_b[at] = 1.0 - self._p_b[at]
+
+    def _shared_factors(self, at: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Return the common factor of p(v|b) of some pixels."""
+        return self._factor_shared[at] if self._conditional else np.full(len(at), self._factor)
+
+    def _begin(self, pixels: NDArray[np.uint8], features: Features) -> None:
+        """Take a frame for background, the only thing that each pixel has ever shown."""
+        for table, feature in zip(self._tables, features, strict=True):
+            table.seen[: table.used] = 0.0
+            table.features[0] = feature
+            table.seen[0] = table.shared[0] = 1.0
+        self._background[:] = pixels
+        self._p_b[:] = 1.0
+        self._factor, self._earlier = np.float32(1.0), np.float32(0.0)
+        self._conditional = False
+
+    def _begin_background(self) -> None:
+        """Forget what went for background so far: only now is it known what each pixel shows most often."""
+        for table in self._tables:
+            table.shared[: table.used] = 0.0
+        self._p_b[:] = 0.0
+        self._earlier = np.float32(1.0)
+
+    def _settle(self) -> None:
+        """End the training: p(b) and p(v and b), seen in a part of it, stand for the whole."""
+        share = np.float32(1.0) - self._earlier
+        self._p_b /= share
+        if self.parameters.mode is StatMode.JOINT:
+            for table in self._tables:
+                table.shared[: table.used] /= share
+            return
+        self._conditional = True
+        self._factor_shared[:] = 1.0
+        scale = self._factor / (share * np.maximum(self._p_b, np.float32(1e-6)))
+        for table in self._tables:
+            table.shared[: table.used] *= scale
+
+    def _take_in(self) -> None:
+        """Take common factors that have become small into the tables, and begin them again."""
+        if self._factor < FADED:
+            for table in self._tables:
+                used = table.used
+                table.seen[:used] *= self._factor
+                if not self._conditional:
+                    table.shared[:used] *= self._factor
+            self._factor = np.float32(1.0)
+        if self._conditional and self._factor_shared.min() < FADED:
+            faded = np.flatnonzero(self._factor_shared < FADED)
+            for table in self._tables:
+                table.shared[: table.used, faded] *= self._factor_shared[faded]
+            self._factor_shared[faded] = 1.0
