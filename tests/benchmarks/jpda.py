@@ -50,7 +50,7 @@ def seconds(work: Callable[[], object], times: int) -> float:
 
 
 def main() -> list[Line]:
-    """Print both comparisons, and return how much faster than EHM2 it is, and how equal, where that is here."""
+    """Print both comparisons; return how much faster than EHM2 it is, and how equal, where that is here."""
     lines = []
     try:
         from pyehm.core import EHM2
