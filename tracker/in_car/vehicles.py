@@ -342,8 +342,10 @@ class VehicleStore:
 
 
 def _outline(box: Floats, height: int, width: int) -> tuple[float, float, float]:
-    """Return what of a box's sides and foot lies in the picture: x0, x1, row."""
-    return max(float(box[0]), 0.0), min(float(box[2]), float(width)), min(float(box[3]), height - 1.0)
+    """Return what of a box's sides and foot lies in the picture, a pixel at least: x0, x1, row."""
+    x0 = min(max(float(box[0]), 0.0), width - 1.0)
+    x1 = min(max(float(box[2]), x0 + 1.0), float(width))
+    return x0, x1, min(float(box[3]), height - 1.0)
 
 
 def _on_lamp(relief: Relief, position: Floats) -> NDArray[np.bool_]:
