@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from scenarios import bridge
 from scenarios.log import EpisodeLog, TraceLog
 from scenarios.spec import Scenario, spec_id
+from sim.params import InCarParams
 from tracker.base import Tracker
 from tracker.types import Diagnostics, Frame, Info, Traces, Tracks
 
 if TYPE_CHECKING:
-    from sim.simulation import Observation
+    from sim.simulation import Observation, Scene
 
 OnFrame = Callable[["Observation", Mapping[str, tuple[Tracks, Diagnostics]]], None]
 """Is shown each frame with what every tracker made of it, by the tracker's name."""
@@ -50,11 +51,10 @@ def run_episode(
     Raises:
         RenderUnavailableError: If there is no off-screen OpenGL here.
     """
-    from sim.scenes.in_car import InCarScene  # with the traffic, the meshes and the renderer: heavy
     from sim.simulation import Simulation
 
-    scene = InCarScene(scenario.in_car, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
-    with Simulation(scene, scenario.in_car.sensor, seed=seed) as simulation:
+    scene = make_scene(scenario, seed)
+    with Simulation(scene, scenario.params.sensor, seed=seed) as simulation:
         return track_observations(
             simulation.run(scenario.frames),
             scenario,
@@ -64,6 +64,17 @@ def run_episode(
             odometry=odometry,
             on_frame=on_frame,
         )
+
+
+def make_scene(scenario: Scenario, seed: int) -> Scene:
+    """Populate the world of a scenario for one seed."""
+    # With the traffic and the meshes: heavy.
+    from sim.scenes.in_car import InCarScene
+    from sim.scenes.motorcycle_lane import MotorcycleLaneScene
+
+    if isinstance(scenario.params, InCarParams):
+        return InCarScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
+    return MotorcycleLaneScene(scenario.params, seed=seed, rate=scenario.rate)
 
 
 def track_observations(

@@ -27,7 +27,14 @@ _ROUGHNESS = {
     Surface.HEAD_LAMP: 0.2,
     Surface.TAIL_LAMP: 0.3,
 }
-_PAINTED = (Surface.PAINT, Surface.CARGO, Surface.FOLIAGE, Surface.FACADE, Surface.HILL)
+_PAINTED = (
+    Surface.PAINT,
+    Surface.CARGO,
+    Surface.FABRIC,
+    Surface.FOLIAGE,
+    Surface.FACADE,
+    Surface.HILL,
+)
 _EXPOSURE = 3.0
 _LAND = (0.16, 0.17, 0.09)
 

@@ -160,7 +160,7 @@ def scenario() -> dict[str, Any]:
         "description": "Nothing but a car that weaves.",
         "seconds": FRAMES / RATE,
         "rate": RATE,
-        "in_car": {"camera": {"width": WIDTH, "focal": FOCAL}, "light": {"time": "day", "haze": 0.0012}},
+        "params": {"camera": {"width": WIDTH, "focal": FOCAL}, "light": {"time": "day", "haze": 0.0012}},
     }
 
 

@@ -12,7 +12,7 @@ def test_the_library_holds_the_six_scenarios_of_twenty_seconds():
     assert tuple(spec.library()) == NAMES
     for name in NAMES:
         scenario = spec.load(name)
-        camera = scenario.in_car.camera
+        camera = scenario.params.camera
         assert (scenario.name, scenario.frames, scenario.rate) == (name, 600, 30)
         assert (camera.width, camera.height) == (640, 480)
         assert scenario.description
@@ -22,20 +22,20 @@ def test_a_file_is_read_and_named_by_its_stem(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('scene = "in-car"\nseconds = 2\n[traffic]\ndensity = 3\n')
     scenario = spec.load(path)
-    assert (scenario.name, scenario.frames, scenario.in_car.traffic.density) == ("mine", 60, 3.0)
+    assert (scenario.name, scenario.frames, scenario.params.traffic.density) == ("mine", 60, 3.0)
 
 
 def test_overrides_are_toml_and_words_need_no_quotes():
     scenario = spec.load(
         "in-car-day", ["sensor.noise=3", "light.time=night", "road.curved=true", 'scenery.setting="urban"']
     )
-    params = scenario.in_car
+    params = scenario.params
     assert (params.sensor.noise, params.light.time, params.road.curved) == (3.0, "night", True)
     assert params.scenery.setting == "urban"
 
 
 def test_the_last_override_wins():
-    assert spec.load("in-car-day", ["sensor.noise=3", "sensor.noise=4"]).in_car.sensor.noise == 4.0
+    assert spec.load("in-car-day", ["sensor.noise=3", "sensor.noise=4"]).params.sensor.noise == 4.0
 
 
 def test_the_digest_follows_what_a_drive_depends_on_and_nothing_else(tmp_path):

@@ -1,0 +1,406 @@
+"""Riders in a lane without files: they keep distance, overtake, weave, stop at the kerb, come the wrong way.
+
+Why not highway-env on narrow sublanes: its vehicles keep to the middle of a lane and change lanes whole, one
+Python object each; motorcycles take any offset, squeeze through gaps that no sublane has, and ride abreast.
+Here every rider has a continuous offset d. Along the lane it follows the nearest rider in its path by IDM
+(Treiber, Hennecke, Helbing 2000). Across it picks, several times a second, the offset that promises most
+acceleration, less what the way there and the distance from the favourite offset cost: MOBIL's trade with
+offsets in place of lanes. Nobody moves toward a neighbour who could not brake for it, two who meet from both
+sides share the gap, and a step that would still make two bodies touch is not taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.models import Model
+from sim.params import RiderParams
+from sim.rng import stream
+from sim.world import FIRST_VEHICLE_ID, Bodies, Kind, Lamps, Role
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+ENTRY = -5.0
+"""s, metres, where riders come in: out of view, below the camera, which stands at s = 0."""
+BEYOND = 14.0
+"""Metres past the far end of the view after which riders are taken out."""
+WARM_UP = 4.0
+"""Seconds that the traffic has been riding when an episode begins."""
+
+_TIME_GAP, _STANDSTILL, _ACCELERATION, _BRAKING, _HARDEST = 0.55, 0.9, 1.8, 2.2, 7.0
+_SIDE = 0.22  # metres that riders abreast keep between them
+_TURN = 0.12  # radians that a machine turns from the lane's direction at most
+_ROOM = np.array([0.08, 0.13])  # metres that a turned, leaning body takes more, ahead and to each side
+_STEER = 2.2  # m/s^2 across the lane
+_DECIDE = 6  # ticks between two choices of an offset
+_OFFSETS = 15  # that are compared
+_SIGHT = 28.0  # metres ahead
+_GRAVITY = 9.81
+
+JACKETS = np.array(
+    [
+        (0.85, 0.85, 0.83),
+        (0.12, 0.13, 0.16),
+        (0.20, 0.28, 0.50),
+        (0.62, 0.10, 0.11),
+        (0.80, 0.66, 0.18),
+        (0.18, 0.42, 0.30),
+        (0.55, 0.57, 0.60),
+        (0.76, 0.42, 0.52),
+        (0.48, 0.36, 0.26),
+        (0.82, 0.44, 0.14),
+        (0.36, 0.60, 0.72),
+    ]
+)
+"""Colours of jackets, sRGB."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Riders:
+    """N riders as parallel arrays; d counts to the left, speeds along the own way.
+
+    Attributes:
+        ids: (N,) uint32.
+        way: (N,) 1, or -1 for who comes the wrong way.
+        s: (N,) metres along the lane.
+        d: (N,) metres, offset of the middle.
+        v: (N,) m/s, >= 0.
+        u: (N,) m/s to the left.
+        yaw: (N,) radians from the lane's direction, to the left.
+        lean: (N,) metres to the left for each metre of height.
+        aim: (N,) offset that is steered for.
+        wanted: (N,) m/s.
+        favourite: (N,) offset that it likes best.
+        weave: (N, 3) metres, rad/s and radians: how the favourite swings.
+        stop: (N,) s of the place at the kerb where it stops, not a number if it stops nowhere.
+        leave: (N,) tick at which a standing one leaves; 0 while it rides.
+        half: (N, 2) half length and half width, with the room that turning takes.
+        sizes: (N, 3) metres.
+        models: (N,) int32.
+        colours: (N, 3) float32.
+    """
+
+    ids: NDArray[np.uint32]
+    way: Floats
+    s: Floats
+    d: Floats
+    v: Floats
+    u: Floats
+    yaw: Floats
+    lean: Floats
+    aim: Floats
+    wanted: Floats
+    favourite: Floats
+    weave: Floats
+    stop: Floats
+    leave: NDArray[np.int64]
+    half: Floats
+    sizes: Floats
+    models: NDArray[np.int32]
+    colours: NDArray[np.float32]
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def take(self, rows: Mask) -> Self:
+        return replace(self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+
+    def joined(self, other: Self) -> Self:
+        return replace(
+            self,
+            **{f.name: np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)},
+        )
+
+
+class RiderTraffic:
+    """The traffic of one lane, from its parameters and a seed.
+
+    Args:
+        params: How many, how fast, and who does what.
+        lane: Lowest and highest offset d of the lane, metres.
+        far: s of the far end of the view, metres.
+        models: All models of the scene; motorcycles are picked among them.
+        seed: Of the episode.
+        rate: Ticks a second.
+    """
+
+    def __init__(
+        self,
+        params: RiderParams,
+        *,
+        lane: tuple[float, float],
+        far: float,
+        models: tuple[Model, ...],
+        seed: int,
+        rate: int,
+    ) -> None:
+        self._params, self._lane, self._far, self._seed, self._rate = params, lane, far, seed, rate
+        self._catalogue = models
+        self._machines = [k for k, model in enumerate(models) if model.kind == Kind.MOTORCYCLE]
+        self._drawn = 0
+        self._tick = -round(WARM_UP * rate)
+        self._arrivals = stream(seed, "riders", "arrivals")
+        self._due = self._interval()
+        self._riders = self._populated()
+        self._stops = self._planned("parked", params.parked, params.parked_at)
+        self._wrong = self._planned("wrong way", params.wrong_way, params.wrong_way_at)
+        while self._tick < 0:
+            self.step()
+
+    def step(self) -> None:
+        """Ride on for one tick."""
+        self._tick += 1
+        self._let_in()
+        now = self._riders
+        kept = (now.s < self._far + BEYOND) & (now.s > ENTRY - 3.0)
+        now = now.take(kept)
+        now = self._pulled_over(now)
+        if self._tick % _DECIDE == 0:
+            now = replace(now, aim=self._aims(now))
+        self._riders = self._moved(now)
+
+    def bodies(self) -> Bodies:
+        """Return all riders, machine and rider one body each."""
+        now, count = self._riders, len(self._riders)
+        yaws = np.where(now.way > 0, now.yaw, np.pi - now.yaw)
+        riding = now.leave == 0
+        lamps = np.where(riding, Lamps.OFF, Lamps.TAIL).astype(np.uint8)
+        velocities = np.stack([now.way * now.v, now.u, np.zeros(count)], axis=1)
+        return Bodies(
+            ids=now.ids,
+            kinds=np.full(count, Kind.MOTORCYCLE, np.uint8),
+            roles=np.where(now.way > 0, Role.SAME_WAY, Role.WRONG_WAY).astype(np.uint8),
+            models=now.models,
+            positions=np.stack([now.s, now.d, np.zeros(count)], axis=1),
+            yaws=yaws,
+            velocities=velocities,
+            sizes=now.sizes,
+            colours=now.colours,
+            lamps=lamps,
+            leans=np.stack([np.zeros(count), now.lean], axis=1),
+        )
+
+    def _interval(self) -> float:
+        """Draw the seconds until the next rider wants to come in."""
+        flow = self._params.riders * self._params.speed / (self._far - ENTRY)
+        return float(self._arrivals.exponential(0.8 / flow))
+
+    def _planned(self, what: str, count: int, first: float) -> list[int]:
+        """Draw the ticks from which on ``count`` riders do something, the first after ``first`` seconds."""
+        rng = stream(self._seed, "riders", what)
+        gaps = rng.uniform(2.0, 3.5, count)
+        return [round((first + t) * self._rate) for t in np.cumsum(gaps) - gaps]
+
+    def _populated(self) -> _Riders:
+        """Spread riders over the lane."""
+        rng = stream(self._seed, "riders", "start")
+        riders = self._draw(ENTRY, 0.0).take(np.zeros(1, bool))
+        wanted = round(0.9 * self._params.riders)
+        for _ in range(40 * wanted):
+            if len(riders) == wanted:
+                break
+            new = self._draw(float(rng.uniform(ENTRY, self._far + BEYOND)), float(rng.uniform()))
+            if self._free(riders, new, ahead=1.0):
+                riders = riders.joined(new)
+        return riders
+
+    def _draw(self, s: float, place: float, way: float = 1.0) -> _Riders:
+        """Draw the next rider, at ``s`` and a share ``place`` of the lane's width."""
+        rng = stream(self._seed, "riders", self._drawn)
+        self._drawn += 1
+        p, (low, high) = self._params, self._lane
+        model = self._machines[int(rng.integers(len(self._machines)))]
+        size = np.array(self._catalogue[model].size) * rng.uniform(0.95, 1.05, 3)
+        half = 0.5 * size[:2] + _ROOM
+        speed = max(p.speed + p.speed_spread * float(np.clip(rng.normal(), -2, 2)), 0.3 * p.speed)
+        jacket = JACKETS[int(rng.integers(len(JACKETS)))] + rng.normal(0, 0.03, 3)
+        weave = [p.weave * rng.uniform(0.4, 1.6), 2 * np.pi / rng.uniform(4.0, 9.0), rng.uniform(0, 2 * np.pi)]
+        favourite = rng.uniform(low + half[1], high - half[1])
+        d = low + half[1] + place * (high - low - 2 * half[1])
+        one = np.ones(1)
+        return _Riders(
+            ids=np.array([FIRST_VEHICLE_ID + self._drawn - 1], np.uint32),
+            way=way * one,
+            s=s * one,
+            d=d * one,
+            v=0.9 * speed * one,
+            u=0 * one,
+            yaw=0 * one,
+            lean=0 * one,
+            aim=d * one,
+            wanted=speed * one,
+            favourite=favourite * one,
+            weave=np.array([weave]),
+            stop=np.nan * one,
+            leave=np.zeros(1, np.int64),
+            half=half[None],
+            sizes=size[None],
+            models=np.array([model], np.int32),
+            colours=np.clip(jacket, 0.02, 0.97)[None].astype(np.float32),
+        )
+
+    def _free(self, riders: _Riders, new: _Riders, *, ahead: float) -> bool:
+        """Whether a rider has its place to itself, and ``ahead`` seconds to whoever rides before it."""
+        gap = np.abs(riders.s - new.s) - riders.half[:, 0] - new.half[0, 0]
+        side = np.abs(riders.d - new.d) - riders.half[:, 1] - new.half[0, 1]
+        return not bool(((gap < 0.6 + ahead * new.v) & (side < _SIDE)).any())
+
+    def _let_in(self) -> None:
+        """Let riders in whose time has come, where the entry is free and the lane not full."""
+        self._due -= 1 / self._rate
+        riders = self._riders
+        if self._wrong and self._tick >= self._wrong[0]:
+            new = self._draw(self._far + BEYOND - 2.0, 0.96, way=-1.0)
+            if self._free(riders, new, ahead=1.0):
+                self._wrong.pop(0)
+                self._riders = riders = riders.joined(replace(new, favourite=new.d, weave=0 * new.weave))
+        if self._due > 0 or int((riders.s < self._far).sum()) >= self._params.riders:
+            return
+        new = self._draw(ENTRY, float(self._arrivals.uniform()))
+        near = riders.take((riders.s - ENTRY < 6.0) & (riders.way > 0))
+        if len(near):
+            new = replace(new, v=np.minimum(new.v, near.v.min() + 0.5))
+        if self._free(riders, new, ahead=0.5):
+            self._riders = riders.joined(new)
+            self._due = self._interval()
+
+    def _pulled_over(self, now: _Riders) -> _Riders:
+        """Make riders choose a place at the kerb, stand there, and leave."""
+        stop, leave, v, u = now.stop.copy(), now.leave.copy(), now.v.copy(), now.u.copy()
+        if self._stops and self._tick >= self._stops[0]:
+            # Whoever is near the kerb and far enough before a place that can be seen.
+            room = stop_distance(now.v) + 4.0
+            fit = np.isnan(stop) & (now.way > 0) & (now.s + room > 14.0) & (now.s + room < 0.62 * self._far)
+            if fit.any():
+                self._stops.pop(0)
+                chosen = int(np.flatnonzero(fit)[np.argmin(now.d[fit])])
+                stop[chosen] = now.s[chosen] + room[chosen]
+        standing = leave > 0
+        arrived = (now.s >= stop - 0.6) & (now.v < 0.25) & ~standing
+        leave[arrived] = self._tick + round(self._params.stand * self._rate)
+        gone = standing & (self._tick >= leave)
+        stop[gone], leave[gone] = np.nan, 0
+        v[leave > 0] = u[leave > 0] = 0.0
+        return replace(now, stop=stop, leave=leave, v=v, u=u)
+
+    def _kerb(self, now: _Riders) -> Floats:
+        return self._lane[0] - 0.35 + now.half[:, 1]
+
+    def _aims(self, now: _Riders) -> Floats:
+        """Choose the offset that each rider steers for."""
+        (low, high), t = self._lane, self._tick / self._rate
+        low_d, high_d = low + now.half[:, 1], high - now.half[:, 1]
+        swing = now.favourite + now.weave[:, 0] * np.sin(now.weave[:, 1] * t + now.weave[:, 2])
+        offsets = low_d[:, None] + np.linspace(0, 1, _OFFSETS) * (high_d - low_d)[:, None]
+        offsets = np.concatenate([offsets, np.clip(swing, low_d, high_d)[:, None]], axis=1)
+        gap, closing = _ahead(now)
+        wide = now.half[:, None, 1] + now.half[None, :, 1] + _SIDE
+        in_path = np.abs(now.d[None, None, :] - offsets[:, :, None]) < wide[:, None, :]
+        worth = _idm(
+            now.v[:, None, None],
+            now.wanted[:, None, None],
+            np.where(in_path, gap[:, None, :], np.inf),
+            closing[:, None, :],
+        ).min(axis=2, initial=_ACCELERATION)
+        right, left = _space(now)
+        outside = (offsets > (now.d + left)[:, None] + 1e-6) | (offsets < (now.d - right)[:, None] - 1e-6)
+        worth = np.maximum(worth, -3.0) - 2.0 * outside
+        worth -= 0.30 * np.abs(offsets - now.d[:, None]) + 0.22 * np.abs(offsets - swing[:, None])
+        best = offsets[np.arange(len(now)), worth.argmax(axis=1)]
+        return np.where(np.isnan(now.stop), best, self._kerb(now))
+
+    def _moved(self, now: _Riders) -> _Riders:
+        """Accelerate, steer and move, and leave out what would make two riders touch."""
+        dt = 1 / self._rate
+        standing = now.leave > 0
+        gap, closing = _ahead(now)
+        across = now.d[None, :] - now.d[:, None]
+        soon = across + 0.4 * (now.u[None, :] - now.u[:, None])
+        wide = now.half[:, None, 1] + now.half[None, :, 1] + 0.5 * _SIDE
+        in_path = (np.minimum(np.abs(across), np.abs(soon)) < wide) | (across * soon < 0)
+        before = np.where(in_path, gap, np.inf)
+        rate = _idm(now.v[:, None], now.wanted[:, None], before, closing).min(axis=1, initial=_ACCELERATION)
+        to_stop = np.where(np.isnan(now.stop), np.inf, now.stop + 0.5 - now.s)
+        rate = np.minimum(rate, _idm(now.v, now.wanted, to_stop, now.v))
+        v = np.where(standing, 0.0, np.maximum(now.v + np.clip(rate, -_HARDEST, _ACCELERATION) * dt, 0.0))
+        # Slow riders steer little; who stands does not move sideways at all.
+        fastest = np.minimum(0.14 * v + np.where(v > 0.3, 0.15, 0.0), 1.1)
+        wish = np.clip(1.4 * (now.aim - now.d), -fastest, fastest)
+        u = now.u + np.clip(wish - now.u, -_STEER * dt, _STEER * dt)
+        right, left = _space(now)
+        u = np.where(standing, 0.0, np.clip(u, -0.5 * right / dt, 0.5 * left / dt))
+        s, d = _apart(now, now.s + now.way * v * dt, now.d + u * dt)
+        stayed = s == now.s
+        v, moved = np.where(stayed, 0.0, v), (d - now.d) / dt
+        yaw = np.clip(np.arctan2(moved, np.maximum(v, 2.5)), -_TURN, _TURN)
+        lean = np.clip((moved - now.u) / dt / _GRAVITY, -0.25, 0.25)
+        return replace(
+            now,
+            s=s,
+            d=d,
+            v=v,
+            u=moved,
+            yaw=now.yaw + (yaw - now.yaw) * min(1.0, 6 * dt),
+            lean=now.lean + (lean - now.lean) * min(1.0, 5 * dt),
+        )
+
+
+def stop_distance(v: Floats) -> Floats:
+    """Metres that a rider of speed ``v`` takes to stop comfortably."""
+    return v * v / (2 * _BRAKING) + v
+
+
+def _idm(v: Floats, wanted: Floats, gap: Floats, closing: Floats) -> Floats:
+    """Acceleration of the intelligent driver model, m/s^2; an infinite gap is a free road."""
+    dynamic = v * _TIME_GAP + v * closing / (2 * np.sqrt(_ACCELERATION * _BRAKING))
+    ratio = (_STANDSTILL + np.maximum(dynamic, 0.0)) / np.maximum(gap, 0.05)
+    return np.asarray(_ACCELERATION * (1 - (v / np.maximum(wanted, 0.1)) ** 4 - ratio**2))
+
+
+def _ahead(now: _Riders) -> tuple[Floats, Floats]:
+    """Give the free metres (N, N) from each rider to each one before it, else infinite, and how fast they close."""
+    along = now.way[:, None] * (now.s[None, :] - now.s[:, None])
+    gap = along - now.half[:, None, 0] - now.half[None, :, 0]
+    closing = now.v[:, None] - now.v[None, :] * now.way[:, None] * now.way[None, :]
+    before = (along > 0) & (gap < _SIGHT + 2.0 * np.maximum(closing - 4.0, 0.0))
+    return np.where(before, gap, np.inf), closing
+
+
+def _space(now: _Riders) -> tuple[Floats, Floats]:
+    """Give the free metres to the right and to the left of each rider, between those who could not brake."""
+    apart = np.abs(now.s[None, :] - now.s[:, None]) - now.half[:, None, 0] - now.half[None, :, 0]
+    speed = now.way * now.v
+    nearer = (speed[:, None] - speed[None, :]) * np.sign(now.s[None, :] - now.s[:, None])
+    beside = apart < 0.4 + np.maximum(nearer, 0.0) ** 2 / (2 * _BRAKING) + 0.2 * np.maximum(nearer, 0.0)
+    np.fill_diagonal(beside, False)
+    across = now.d[None, :] - now.d[:, None]
+    free = np.maximum(np.abs(across) - now.half[:, None, 1] - now.half[None, :, 1] - _SIDE, 0.0)
+    right = np.where(beside & (across <= 0), free, np.inf).min(axis=1, initial=np.inf)
+    left = np.where(beside & (across >= 0), free, np.inf).min(axis=1, initial=np.inf)
+    return right, left
+
+
+def _apart(now: _Riders, s: Floats, d: Floats) -> tuple[Floats, Floats]:
+    """Take back moves after which bodies would touch: first to the side, then ahead; who was apart stays so."""
+    s, d = s.copy(), d.copy()
+    length = now.half[:, None, 0] + now.half[None, :, 0]
+    width = now.half[:, None, 1] + now.half[None, :, 1]
+    for places, before in ((d, now.d), (s, now.s)):
+        while True:
+            touch = (np.abs(s[None, :] - s[:, None]) < length) & (np.abs(d[None, :] - d[:, None]) < width)
+            np.fill_diagonal(touch, False)
+            moved = touch.any(axis=1) & (places != before)
+            if not moved.any():
+                break
+            # Of two in line the one behind waits.
+            if places is s:
+                rear = touch & (now.way[:, None] * (now.s[None, :] - now.s[:, None]) > 0)
+                waiting = moved & rear.any(axis=1)
+                moved = waiting if waiting.any() else moved
+            places[moved] = before[moved]
+    return s, d
