@@ -174,12 +174,12 @@ class RiderParams(Params):
     """Metres by which riders swing about the offset that they like."""
     wrong_way: Count = 0
     """Riders who come the wrong way."""
-    wrong_way_at: NonNegative = 1.5
-    """Seconds after which the first of them comes."""
+    wrong_way_at: Annotated[FiniteFloat, Field(ge=-3)] = -2.5
+    """Seconds from which on the first of them comes, at first out of view."""
     parked: Count = 0
     """Riders who stop at the kerb and leave again."""
-    parked_at: NonNegative = 0.3
-    """Seconds after which the first of them begins to pull over."""
+    parked_at: Annotated[FiniteFloat, Field(ge=-3)] = -2.5
+    """Seconds from which on the first of them pulls over; before 0 it does so already when the run begins."""
     stand: NonNegative = 6.0
     """Seconds that they stand."""
 
@@ -189,9 +189,9 @@ class LaneSceneryParams(SceneryParams):
 
     setting: Literal["motorway", "rural", "urban", "avenue"] = "avenue"
     corridor: Positive = 4.0
-    density: NonNegative = 2.5
+    density: NonNegative = 3.5
     bridges: NonNegative = 0.0
-    wind: NonNegative = 1.0
+    wind: NonNegative = 0.7
     """How far plants sway, in hundredths of their height."""
 
 

@@ -32,7 +32,7 @@ BEYOND = 14.0
 WARM_UP = 4.0
 """Seconds that the traffic has been riding when an episode begins."""
 
-_TIME_GAP, _STANDSTILL, _ACCELERATION, _BRAKING, _HARDEST = 0.55, 0.9, 1.8, 2.2, 7.0
+_TIME_GAP, _STANDSTILL, _ACCELERATION, _BRAKING, _FIRM, _HARDEST = 0.55, 0.9, 1.8, 2.2, 3.2, 7.0
 _SIDE = 0.22  # metres that riders abreast keep between them
 _TURN = 0.12  # radians that a machine turns from the lane's direction at most
 _ROOM = np.array([0.08, 0.13])  # metres that a turned, leaning body takes more, ahead and to each side
@@ -40,6 +40,8 @@ _STEER = 2.2  # m/s^2 across the lane
 _DECIDE = 6  # ticks between two choices of an offset
 _OFFSETS = 15  # that are compared
 _SIGHT = 28.0  # metres ahead
+_TRIES = 8  # places across the lane that a rider tries before it waits for the next tick
+_WAY = 1.7  # metres that riders leave at the left edge to who comes the wrong way
 _GRAVITY = 9.81
 
 JACKETS = np.array(
@@ -147,6 +149,7 @@ class RiderTraffic:
         self._arrivals = stream(seed, "riders", "arrivals")
         self._due = self._interval()
         self._riders = self._populated()
+        self._next = self._draw(ENTRY, 0.5)
         self._stops = self._planned("parked", params.parked, params.parked_at)
         self._wrong = self._planned("wrong way", params.wrong_way, params.wrong_way_at)
         while self._tick < 0:
@@ -255,33 +258,39 @@ class RiderTraffic:
         self._due -= 1 / self._rate
         riders = self._riders
         if self._wrong and self._tick >= self._wrong[0]:
-            new = self._draw(self._far + BEYOND - 2.0, 0.96, way=-1.0)
-            if self._free(riders, new, ahead=1.0):
-                self._wrong.pop(0)
-                self._riders = riders = riders.joined(replace(new, favourite=new.d, weave=0 * new.weave))
+            self._wrong.pop(0)
+            new = self._draw(self._far + BEYOND - 6.0, 1.0, way=-1.0)
+            # Nobody is met where it comes in: it was there before, out of view.
+            riders = riders.take(np.abs(riders.s - new.s) > 5.0)
+            self._riders = riders = riders.joined(replace(new, favourite=new.d, weave=0 * new.weave))
         if self._due > 0 or int((riders.s < self._far).sum()) >= self._params.riders:
             return
-        new = self._draw(ENTRY, float(self._arrivals.uniform()))
-        near = riders.take((riders.s - ENTRY < 6.0) & (riders.way > 0))
-        if len(near):
-            new = replace(new, v=np.minimum(new.v, near.v.min() + 0.5))
-        if self._free(riders, new, ahead=0.5):
-            self._riders = riders.joined(new)
-            self._due = self._interval()
+        new, (low, high) = self._next, self._lane
+        for place in self._arrivals.uniform(0, 1, _TRIES):
+            d = low + new.half[:, 1] + place * (high - low - 2 * new.half[:, 1])
+            new = replace(new, d=d, aim=d)
+            path = (np.abs(riders.d - d) < riders.half[:, 1] + new.half[0, 1] + _SIDE) & (riders.s < 15.0)
+            # Nobody comes in faster than whoever it would have to brake for.
+            new = replace(new, v=np.minimum(0.9 * new.wanted, riders.v[path].min(initial=np.inf) + 0.5))
+            if self._free(riders, new, ahead=0.6):
+                self._riders = riders.joined(new)
+                self._next = self._draw(ENTRY, 0.5)
+                self._due = self._interval()
+                return
 
     def _pulled_over(self, now: _Riders) -> _Riders:
         """Make riders choose a place at the kerb, stand there, and leave."""
         stop, leave, v, u = now.stop.copy(), now.leave.copy(), now.v.copy(), now.u.copy()
         if self._stops and self._tick >= self._stops[0]:
             # Whoever is near the kerb and far enough before a place that can be seen.
-            room = stop_distance(now.v) + 4.0
+            room = now.v**2 / (2 * _BRAKING) + 0.4 * now.v
             fit = np.isnan(stop) & (now.way > 0) & (now.s + room > 14.0) & (now.s + room < 0.62 * self._far)
             if fit.any():
                 self._stops.pop(0)
                 chosen = int(np.flatnonzero(fit)[np.argmin(now.d[fit])])
                 stop[chosen] = now.s[chosen] + room[chosen]
         standing = leave > 0
-        arrived = (now.s >= stop - 0.6) & (now.v < 0.25) & ~standing
+        arrived = (now.s >= stop - 0.3) & (now.v < 0.3) & ~standing
         leave[arrived] = self._tick + round(self._params.stand * self._rate)
         gone = standing & (self._tick >= leave)
         stop[gone], leave[gone] = np.nan, 0
@@ -294,10 +303,12 @@ class RiderTraffic:
     def _aims(self, now: _Riders) -> Floats:
         """Choose the offset that each rider steers for."""
         (low, high), t = self._lane, self._tick / self._rate
-        low_d, high_d = low + now.half[:, 1], high - now.half[:, 1]
+        make_way = _WAY * ((now.way > 0) & (now.way < 0).any())
+        low_d, high_d = low + now.half[:, 1], high - make_way - now.half[:, 1]
         swing = now.favourite + now.weave[:, 0] * np.sin(now.weave[:, 1] * t + now.weave[:, 2])
         offsets = low_d[:, None] + np.linspace(0, 1, _OFFSETS) * (high_d - low_d)[:, None]
-        offsets = np.concatenate([offsets, np.clip(swing, low_d, high_d)[:, None]], axis=1)
+        swing = np.clip(swing, low_d, high_d)
+        offsets = np.concatenate([offsets, swing[:, None]], axis=1)
         gap, closing = _ahead(now)
         wide = now.half[:, None, 1] + now.half[None, :, 1] + _SIDE
         in_path = np.abs(now.d[None, None, :] - offsets[:, :, None]) < wide[:, None, :]
@@ -325,11 +336,10 @@ class RiderTraffic:
         in_path = (np.minimum(np.abs(across), np.abs(soon)) < wide) | (across * soon < 0)
         before = np.where(in_path, gap, np.inf)
         rate = _idm(now.v[:, None], now.wanted[:, None], before, closing).min(axis=1, initial=_ACCELERATION)
-        to_stop = np.where(np.isnan(now.stop), np.inf, now.stop + 0.5 - now.s)
-        rate = np.minimum(rate, _idm(now.v, now.wanted, to_stop, now.v))
+        to_stop = np.where(np.isnan(now.stop), np.inf, np.maximum(now.stop - now.s, 0.0))
+        rate = np.minimum(rate, (np.sqrt(2 * _BRAKING * to_stop) - now.v) / 0.25)
         v = np.where(standing, 0.0, np.maximum(now.v + np.clip(rate, -_HARDEST, _ACCELERATION) * dt, 0.0))
-        # Slow riders steer little; who stands does not move sideways at all.
-        fastest = np.minimum(0.14 * v + np.where(v > 0.3, 0.15, 0.0), 1.1)
+        fastest = np.minimum(0.14 * v + 0.15, 1.1)  # slow riders steer little
         wish = np.clip(1.4 * (now.aim - now.d), -fastest, fastest)
         u = now.u + np.clip(wish - now.u, -_STEER * dt, _STEER * dt)
         right, left = _space(now)
@@ -350,16 +360,17 @@ class RiderTraffic:
         )
 
 
-def stop_distance(v: Floats) -> Floats:
-    """Metres that a rider of speed ``v`` takes to stop comfortably."""
-    return v * v / (2 * _BRAKING) + v
-
-
 def _idm(v: Floats, wanted: Floats, gap: Floats, closing: Floats) -> Floats:
-    """Acceleration of the intelligent driver model, m/s^2; an infinite gap is a free road."""
+    """Acceleration of the intelligent driver model, m/s^2; an infinite gap is a free road.
+
+    Who is cut in on brakes firmly, and harder only where that would not do.
+    """
     dynamic = v * _TIME_GAP + v * closing / (2 * np.sqrt(_ACCELERATION * _BRAKING))
-    ratio = (_STANDSTILL + np.maximum(dynamic, 0.0)) / np.maximum(gap, 0.05)
-    return np.asarray(_ACCELERATION * (1 - (v / np.maximum(wanted, 0.1)) ** 4 - ratio**2))
+    room = np.maximum(gap, 0.05)
+    ratio = (_STANDSTILL + np.maximum(dynamic, 0.0)) / room
+    rate = _ACCELERATION * (1 - (v / np.maximum(wanted, 0.1)) ** 4 - ratio**2)
+    needed = np.maximum(closing, 0.0) ** 2 / (2 * np.maximum(gap - 0.4, 0.05))
+    return np.asarray(np.maximum(rate, -np.maximum(_FIRM, 1.2 * needed)))
 
 
 def _ahead(now: _Riders) -> tuple[Floats, Floats]:
@@ -376,7 +387,9 @@ def _space(now: _Riders) -> tuple[Floats, Floats]:
     apart = np.abs(now.s[None, :] - now.s[:, None]) - now.half[:, None, 0] - now.half[None, :, 0]
     speed = now.way * now.v
     nearer = (speed[:, None] - speed[None, :]) * np.sign(now.s[None, :] - now.s[:, None])
-    beside = apart < 0.4 + np.maximum(nearer, 0.0) ** 2 / (2 * _BRAKING) + 0.2 * np.maximum(nearer, 0.0)
+    ahead = now.s[None, :] > now.s[:, None]
+    behind = np.where(ahead == (now.way > 0)[:, None], now.v[:, None], now.v[None, :])
+    beside = apart < 0.7 + 0.2 * behind + np.maximum(nearer, 0.0) ** 2 / (2 * _BRAKING)
     np.fill_diagonal(beside, False)
     across = now.d[None, :] - now.d[:, None]
     free = np.maximum(np.abs(across) - now.half[:, None, 1] - now.half[None, :, 1] - _SIDE, 0.0)

@@ -17,7 +17,7 @@ vec3 turned(vec3 v) {
 vec3 placed(vec3 local) {
     vec2 aside = i_lean * local.z;
     if (in_surface == FOLIAGE) {
-        aside *= 1.0 + sin(vec2(dot(local, vec3(1.7, 2.3, 1.1)), dot(local, vec3(2.1, -1.3, 1.9))));
+        aside *= 1.0 + 0.6 * sin(vec2(dot(local, vec3(1.1, 1.5, 0.7)), dot(local, vec3(1.4, -0.9, 1.2))));
     }
     return i_position + turned(local) + vec3(aside, 0.0);
 }
