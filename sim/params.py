@@ -142,20 +142,20 @@ class LaneCameraParams(Params):
     height: Annotated[int, Field(ge=16, le=4096)] = 240
     focal: Positive = 380.0
     """Pixels."""
-    mount_height: Positive = 9.0
+    mount_height: Positive = 7.5
     """Metres above the ground."""
-    mount_offset: FiniteFloat = -4.0
+    mount_offset: FiniteFloat = -3.5
     """Metres to the left of the lane's middle."""
     yaw: FiniteFloat = 0.10
     """Radians to the left of the lane's direction."""
-    pitch: FiniteFloat = -0.45
+    pitch: FiniteFloat = -0.43
     """Radians, positive looks up."""
 
 
 class LaneParams(Params):
     """The lane of motorcycles."""
 
-    width: Annotated[FiniteFloat, Field(ge=2)] = 6.0
+    width: Annotated[FiniteFloat, Field(ge=2)] = 5.0
     """Metres that riders use."""
     shoulder: NonNegative = 1.2
     """Paved metres beside it."""
@@ -164,7 +164,7 @@ class LaneParams(Params):
 class RiderParams(Params):
     """Who rides, how densely and how fast."""
 
-    riders: Annotated[int, Field(ge=0, le=80)] = 9
+    riders: Annotated[int, Field(ge=0, le=80)] = 13
     """The most that are between the entry and the far end of the view."""
     speed: Positive = 8.0
     """Mean desired speed, m/s."""

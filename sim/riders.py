@@ -36,6 +36,7 @@ _TIME_GAP, _STANDSTILL, _ACCELERATION, _BRAKING, _FIRM, _HARDEST = 0.55, 0.9, 1.
 _SIDE = 0.22  # metres that riders abreast keep between them
 _TURN = 0.12  # radians that a machine turns from the lane's direction at most
 _ROOM = np.array([0.08, 0.13])  # metres that a turned, leaning body takes more, ahead and to each side
+_VERGE = 0.35  # metres of the shoulder that who stands, or comes the wrong way, uses
 _STEER = 2.2  # m/s^2 across the lane
 _DECIDE = 6  # ticks between two choices of an offset
 _OFFSETS = 15  # that are compared
@@ -260,8 +261,11 @@ class RiderTraffic:
         if self._wrong and self._tick >= self._wrong[0]:
             self._wrong.pop(0)
             new = self._draw(self._far + BEYOND - 6.0, 1.0, way=-1.0)
-            # Nobody is met where it comes in: it was there before, out of view.
-            riders = riders.take(np.abs(riders.s - new.s) > 5.0)
+            new = replace(new, d=new.d + _VERGE, aim=new.d + _VERGE)
+            # Out of view nobody is met where it comes in, nor in its way.
+            near = np.abs(riders.s - new.s) < 5.0
+            in_way = (riders.s > self._far) & (riders.d + riders.half[:, 1] > self._lane[1] - _WAY)
+            riders = riders.take(~near & ~in_way)
             self._riders = riders = riders.joined(replace(new, favourite=new.d, weave=0 * new.weave))
         if self._due > 0 or int((riders.s < self._far).sum()) >= self._params.riders:
             return
@@ -298,12 +302,12 @@ class RiderTraffic:
         return replace(now, stop=stop, leave=leave, v=v, u=u)
 
     def _kerb(self, now: _Riders) -> Floats:
-        return self._lane[0] - 0.35 + now.half[:, 1]
+        return self._lane[0] - _VERGE + now.half[:, 1]
 
     def _aims(self, now: _Riders) -> Floats:
         """Choose the offset that each rider steers for."""
         (low, high), t = self._lane, self._tick / self._rate
-        make_way = _WAY * ((now.way > 0) & (now.way < 0).any())
+        make_way = np.where(now.way < 0, -_VERGE, _WAY * (now.way < 0).any())
         low_d, high_d = low + now.half[:, 1], high - make_way - now.half[:, 1]
         swing = now.favourite + now.weave[:, 0] * np.sin(now.weave[:, 1] * t + now.weave[:, 2])
         offsets = low_d[:, None] + np.linspace(0, 1, _OFFSETS) * (high_d - low_d)[:, None]
@@ -332,14 +336,15 @@ class RiderTraffic:
         gap, closing = _ahead(now)
         across = now.d[None, :] - now.d[:, None]
         soon = across + 0.4 * (now.u[None, :] - now.u[:, None])
-        wide = now.half[:, None, 1] + now.half[None, :, 1] + 0.5 * _SIDE
+        # The slower they pass each other, the closer they dare.
+        wide = now.half[:, None, 1] + now.half[None, :, 1] + np.clip(0.02 * closing, 0.02, 0.5 * _SIDE)
         in_path = (np.minimum(np.abs(across), np.abs(soon)) < wide) | (across * soon < 0)
         before = np.where(in_path, gap, np.inf)
         rate = _idm(now.v[:, None], now.wanted[:, None], before, closing).min(axis=1, initial=_ACCELERATION)
         to_stop = np.where(np.isnan(now.stop), np.inf, np.maximum(now.stop - now.s, 0.0))
         rate = np.minimum(rate, (np.sqrt(2 * _BRAKING * to_stop) - now.v) / 0.25)
         v = np.where(standing, 0.0, np.maximum(now.v + np.clip(rate, -_HARDEST, _ACCELERATION) * dt, 0.0))
-        fastest = np.minimum(0.14 * v + 0.15, 1.1)  # slow riders steer little
+        fastest = np.minimum(0.12 * v + 0.3, 1.1)  # slow riders steer little
         wish = np.clip(1.4 * (now.aim - now.d), -fastest, fastest)
         u = now.u + np.clip(wish - now.u, -_STEER * dt, _STEER * dt)
         right, left = _space(now)

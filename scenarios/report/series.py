@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from scenarios.log import EpisodeLog
+from scenarios.score.frames import box_sequence
 from scenarios.score.identification import judge_traces
 from scenarios.score.params import Boxes, ScoringParams
-from scenarios.score.preprocess import box_sequence, select
+from scenarios.score.preprocess import select
 from sim.truth.types import FrameTruth
 
 Floats = NDArray[np.float64]

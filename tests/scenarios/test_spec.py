@@ -8,8 +8,20 @@ from scenarios.spec import SpecError
 NAMES = ("in-car-curve", "in-car-day", "in-car-night", "in-car-rain", "in-car-stop-and-go", "in-car-urban")
 
 
-def test_the_library_holds_the_six_scenarios_of_twenty_seconds():
-    assert tuple(spec.library()) == NAMES
+LANES = ("lane-cloudy", "lane-day", "lane-dense", "lane-flash", "lane-parked", "lane-wrong-way")
+
+
+def test_the_library_holds_the_scenarios_of_the_lane():
+    for name in LANES:
+        scenario = spec.load(name)
+        camera = scenario.params.camera
+        assert (scenario.scene, scenario.frames, scenario.rate) == ("motorcycle-lane", 330, 30)
+        assert (camera.width, camera.height) == (360, 240)
+        assert scenario.description
+
+
+def test_the_library_holds_the_six_in_car_scenarios_of_twenty_seconds():
+    assert tuple(spec.library()) == NAMES + LANES
     for name in NAMES:
         scenario = spec.load(name)
         camera = scenario.params.camera
@@ -49,8 +61,11 @@ def test_the_digest_follows_what_a_drive_depends_on_and_nothing_else(tmp_path):
 
 def test_the_schema_describes_the_file():
     schema = spec.json_schema()
-    assert {"scene", "seconds", "rate", "road", "sensor"} <= set(schema["properties"])
-    assert schema["additionalProperties"] is False
+    assert {option["$ref"].rpartition("/")[2] for option in schema["oneOf"]} == {"InCarFile", "MotorcycleLaneFile"}
+    for name, table in (("InCarFile", "road"), ("MotorcycleLaneFile", "riders")):
+        file = schema["$defs"][name]
+        assert {"scene", "seconds", "rate", "sensor", table} <= set(file["properties"])
+        assert file["additionalProperties"] is False
     json.dumps(schema)
 
 
@@ -89,6 +104,22 @@ def test_wrong_overrides_are_refused_in_one_line(overrides, parts):
 
 
 @pytest.mark.parametrize(
+    ("overrides", "parts"),
+    [
+        (["riders.rider=3"], ["unknown key 'riders.rider'", "did you mean 'riders'"]),
+        (["noise=3"], ["did you mean 'sensor.noise'"]),
+        (["ego.speed=3"], ["unknown key 'ego'"]),
+        (["light.flash=moon"], ["wanted 'none', 'sun' or 'lamp'"]),
+        (["seconds.x=3"], ["'seconds' is no table"]),
+    ],
+)
+def test_keys_are_those_of_the_own_scene(overrides, parts):
+    with pytest.raises(SpecError) as caught:
+        spec.load("lane-day", overrides)
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+@pytest.mark.parametrize(
     ("text", "parts"),
     [
         ('scene = "in-car"\n[sensor]\nnois = 3\n', ["unknown key 'sensor.nois'", "did you mean 'noise'"]),
@@ -96,7 +127,7 @@ def test_wrong_overrides_are_refused_in_one_line(overrides, parts):
         ('scene = "in-car"\n[camera]\nfocal = nan\n', ["camera.focal is nan"]),
         ('scene = "in-car"\n[camera]\nheight = -4\n', ["camera.height is -4"]),
         ("seconds = 3\n", ["'scene' is missing"]),
-        ('scene = "moon"\n', ["scene is 'moon'", "wanted 'in-car'"]),
+        ('scene = "moon"\n', ["scene is 'moon'", "wanted 'in-car' or 'motorcycle-lane'"]),
         ("scene = \n", ["not TOML", "line 1"]),
     ],
 )
