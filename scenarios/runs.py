@@ -161,7 +161,14 @@ def _recorder(run: Run, seed: int, tracker: str, folder: Path) -> Recorder:
 
     camera = run.scenario.params.camera
     title = f"{run.scenario.name}, seed {seed}: {tracker}"
-    return Recorder(folder, width=camera.width, height=camera.height, rate=run.scenario.rate, title=title)
+    return Recorder(
+        folder,
+        width=camera.width,
+        height=camera.height,
+        rate=run.scenario.rate,
+        title=title,
+        scene=run.scenario.scene,
+    )
 
 
 def _keep(run: Run, log: EpisodeLog, document: Document, recorder: Recorder) -> None:

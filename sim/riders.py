@@ -11,19 +11,18 @@ sides share the gap, and a step that would still make two bodies touch is not ta
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Self
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.models import Model
 from sim.params import RiderParams
+from sim.riding import ACCELERATION, BRAKING, SIDE, Riders, ahead, apart, idm, space
 from sim.rng import stream
 from sim.world import FIRST_VEHICLE_ID, Bodies, Kind, Lamps, Role
 
 Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ENTRY = -5.0
 """s, metres, where riders come in: out of view, below the camera, which stands at s = 0."""
@@ -32,15 +31,13 @@ BEYOND = 14.0
 WARM_UP = 4.0
 """Seconds that the traffic has been riding when an episode begins."""
 
-_TIME_GAP, _STANDSTILL, _ACCELERATION, _BRAKING, _FIRM, _HARDEST = 0.55, 0.9, 1.8, 2.2, 3.2, 7.0
-_SIDE = 0.22  # metres that riders abreast keep between them
+_HARDEST = 7.0  # m/s^2 of braking
 _TURN = 0.12  # radians that a machine turns from the lane's direction at most
 _ROOM = np.array([0.08, 0.13])  # metres that a turned, leaning body takes more, ahead and to each side
 _VERGE = 0.35  # metres of the shoulder that who stands, or comes the wrong way, uses
 _STEER = 2.2  # m/s^2 across the lane
 _DECIDE = 6  # ticks between two choices of an offset
 _OFFSETS = 15  # that are compared
-_SIGHT = 28.0  # metres ahead
 _TRIES = 8  # places across the lane that a rider tries before it waits for the next tick
 _WAY = 1.7  # metres that riders leave at the left edge to who comes the wrong way
 _GRAVITY = 9.81
@@ -61,63 +58,6 @@ JACKETS = np.array(
     ]
 )
 """Colours of jackets, sRGB."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Riders:
-    """N riders as parallel arrays; d counts to the left, speeds along the own way.
-
-    Attributes:
-        ids: (N,) uint32.
-        way: (N,) 1, or -1 for who comes the wrong way.
-        s: (N,) metres along the lane.
-        d: (N,) metres, offset of the middle.
-        v: (N,) m/s, >= 0.
-        u: (N,) m/s to the left.
-        yaw: (N,) radians from the lane's direction, to the left.
-        lean: (N,) metres to the left for each metre of height.
-        aim: (N,) offset that is steered for.
-        wanted: (N,) m/s.
-        favourite: (N,) offset that it likes best.
-        weave: (N, 3) metres, rad/s and radians: how the favourite swings.
-        stop: (N,) s of the place at the kerb where it stops, not a number if it stops nowhere.
-        leave: (N,) tick at which a standing one leaves; 0 while it rides.
-        half: (N, 2) half length and half width, with the room that turning takes.
-        sizes: (N, 3) metres.
-        models: (N,) int32.
-        colours: (N, 3) float32.
-    """
-
-    ids: NDArray[np.uint32]
-    way: Floats
-    s: Floats
-    d: Floats
-    v: Floats
-    u: Floats
-    yaw: Floats
-    lean: Floats
-    aim: Floats
-    wanted: Floats
-    favourite: Floats
-    weave: Floats
-    stop: Floats
-    leave: NDArray[np.int64]
-    half: Floats
-    sizes: Floats
-    models: NDArray[np.int32]
-    colours: NDArray[np.float32]
-
-    def __len__(self) -> int:
-        return len(self.ids)
-
-    def take(self, rows: Mask) -> Self:
-        return replace(self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)})
-
-    def joined(self, other: Self) -> Self:
-        return replace(
-            self,
-            **{f.name: np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)},
-        )
 
 
 class RiderTraffic:
@@ -200,7 +140,7 @@ class RiderTraffic:
         gaps = rng.uniform(2.0, 3.5, count)
         return [round((first + t) * self._rate) for t in np.cumsum(gaps) - gaps]
 
-    def _populated(self) -> _Riders:
+    def _populated(self) -> Riders:
         """Spread riders over the lane."""
         rng = stream(self._seed, "riders", "start")
         riders = self._draw(ENTRY, 0.0).take(np.zeros(1, bool))
@@ -209,11 +149,11 @@ class RiderTraffic:
             if len(riders) == wanted:
                 break
             new = self._draw(float(rng.uniform(ENTRY, self._far + BEYOND)), float(rng.uniform()))
-            if self._free(riders, new, ahead=1.0):
+            if self._free(riders, new, headway=1.0):
                 riders = riders.joined(new)
         return riders
 
-    def _draw(self, s: float, place: float, way: float = 1.0) -> _Riders:
+    def _draw(self, s: float, place: float, way: float = 1.0) -> Riders:
         """Draw the next rider, at ``s`` and a share ``place`` of the lane's width."""
         rng = stream(self._seed, "riders", self._drawn)
         self._drawn += 1
@@ -223,11 +163,15 @@ class RiderTraffic:
         half = 0.5 * size[:2] + _ROOM
         speed = max(p.speed + p.speed_spread * float(np.clip(rng.normal(), -2, 2)), 0.3 * p.speed)
         jacket = JACKETS[int(rng.integers(len(JACKETS)))] + rng.normal(0, 0.03, 3)
-        weave = [p.weave * rng.uniform(0.4, 1.6), 2 * np.pi / rng.uniform(4.0, 9.0), rng.uniform(0, 2 * np.pi)]
+        weave = [
+            p.weave * rng.uniform(0.4, 1.6),
+            2 * np.pi / rng.uniform(4.0, 9.0),
+            rng.uniform(0, 2 * np.pi),
+        ]
         favourite = rng.uniform(low + half[1], high - half[1])
         d = low + half[1] + place * (high - low - 2 * half[1])
         one = np.ones(1)
-        return _Riders(
+        return Riders(
             ids=np.array([FIRST_VEHICLE_ID + self._drawn - 1], np.uint32),
             way=way * one,
             s=s * one,
@@ -248,11 +192,11 @@ class RiderTraffic:
             colours=np.clip(jacket, 0.02, 0.97)[None].astype(np.float32),
         )
 
-    def _free(self, riders: _Riders, new: _Riders, *, ahead: float) -> bool:
-        """Whether a rider has its place to itself, and ``ahead`` seconds to whoever rides before it."""
+    def _free(self, riders: Riders, new: Riders, *, headway: float) -> bool:
+        """Whether a rider has its place to itself, and ``headway`` seconds to whoever rides before it."""
         gap = np.abs(riders.s - new.s) - riders.half[:, 0] - new.half[0, 0]
         side = np.abs(riders.d - new.d) - riders.half[:, 1] - new.half[0, 1]
-        return not bool(((gap < 0.6 + ahead * new.v) & (side < _SIDE)).any())
+        return not bool(((gap < 0.6 + headway * new.v) & (side < SIDE)).any())
 
     def _let_in(self) -> None:
         """Let riders in whose time has come, where the entry is free and the lane not full."""
@@ -273,21 +217,21 @@ class RiderTraffic:
         for place in self._arrivals.uniform(0, 1, _TRIES):
             d = low + new.half[:, 1] + place * (high - low - 2 * new.half[:, 1])
             new = replace(new, d=d, aim=d)
-            path = (np.abs(riders.d - d) < riders.half[:, 1] + new.half[0, 1] + _SIDE) & (riders.s < 15.0)
+            path = (np.abs(riders.d - d) < riders.half[:, 1] + new.half[0, 1] + SIDE) & (riders.s < 15.0)
             # Nobody comes in faster than whoever it would have to brake for.
             new = replace(new, v=np.minimum(0.9 * new.wanted, riders.v[path].min(initial=np.inf) + 0.5))
-            if self._free(riders, new, ahead=0.6):
+            if self._free(riders, new, headway=0.6):
                 self._riders = riders.joined(new)
                 self._next = self._draw(ENTRY, 0.5)
                 self._due = self._interval()
                 return
 
-    def _pulled_over(self, now: _Riders) -> _Riders:
+    def _pulled_over(self, now: Riders) -> Riders:
         """Make riders choose a place at the kerb, stand there, and leave."""
         stop, leave, v, u = now.stop.copy(), now.leave.copy(), now.v.copy(), now.u.copy()
         if self._stops and self._tick >= self._stops[0]:
             # Whoever is near the kerb and far enough before a place that can be seen.
-            room = now.v**2 / (2 * _BRAKING) + 0.4 * now.v
+            room = now.v**2 / (2 * BRAKING) + 0.4 * now.v
             fit = np.isnan(stop) & (now.way > 0) & (now.s + room > 14.0) & (now.s + room < 0.62 * self._far)
             if fit.any():
                 self._stops.pop(0)
@@ -301,10 +245,10 @@ class RiderTraffic:
         v[leave > 0] = u[leave > 0] = 0.0
         return replace(now, stop=stop, leave=leave, v=v, u=u)
 
-    def _kerb(self, now: _Riders) -> Floats:
+    def _kerb(self, now: Riders) -> Floats:
         return self._lane[0] - _VERGE + now.half[:, 1]
 
-    def _aims(self, now: _Riders) -> Floats:
+    def _aims(self, now: Riders) -> Floats:
         """Choose the offset that each rider steers for."""
         (low, high), t = self._lane, self._tick / self._rate
         make_way = np.where(now.way < 0, -_VERGE, _WAY * (now.way < 0).any())
@@ -313,43 +257,43 @@ class RiderTraffic:
         offsets = low_d[:, None] + np.linspace(0, 1, _OFFSETS) * (high_d - low_d)[:, None]
         swing = np.clip(swing, low_d, high_d)
         offsets = np.concatenate([offsets, swing[:, None]], axis=1)
-        gap, closing = _ahead(now)
-        wide = now.half[:, None, 1] + now.half[None, :, 1] + _SIDE
+        gap, closing = ahead(now)
+        wide = now.half[:, None, 1] + now.half[None, :, 1] + SIDE
         in_path = np.abs(now.d[None, None, :] - offsets[:, :, None]) < wide[:, None, :]
-        worth = _idm(
+        worth = idm(
             now.v[:, None, None],
             now.wanted[:, None, None],
             np.where(in_path, gap[:, None, :], np.inf),
             closing[:, None, :],
-        ).min(axis=2, initial=_ACCELERATION)
-        right, left = _space(now)
+        ).min(axis=2, initial=ACCELERATION)
+        right, left = space(now)
         outside = (offsets > (now.d + left)[:, None] + 1e-6) | (offsets < (now.d - right)[:, None] - 1e-6)
         worth = np.maximum(worth, -3.0) - 2.0 * outside
         worth -= 0.30 * np.abs(offsets - now.d[:, None]) + 0.22 * np.abs(offsets - swing[:, None])
         best = offsets[np.arange(len(now)), worth.argmax(axis=1)]
         return np.where(np.isnan(now.stop), best, self._kerb(now))
 
-    def _moved(self, now: _Riders) -> _Riders:
+    def _moved(self, now: Riders) -> Riders:
         """Accelerate, steer and move, and leave out what would make two riders touch."""
         dt = 1 / self._rate
         standing = now.leave > 0
-        gap, closing = _ahead(now)
+        gap, closing = ahead(now)
         across = now.d[None, :] - now.d[:, None]
         soon = across + 0.4 * (now.u[None, :] - now.u[:, None])
         # The slower they pass each other, the closer they dare.
-        wide = now.half[:, None, 1] + now.half[None, :, 1] + np.clip(0.02 * closing, 0.02, 0.5 * _SIDE)
+        wide = now.half[:, None, 1] + now.half[None, :, 1] + np.clip(0.02 * closing, 0.02, 0.5 * SIDE)
         in_path = (np.minimum(np.abs(across), np.abs(soon)) < wide) | (across * soon < 0)
         before = np.where(in_path, gap, np.inf)
-        rate = _idm(now.v[:, None], now.wanted[:, None], before, closing).min(axis=1, initial=_ACCELERATION)
+        rate = idm(now.v[:, None], now.wanted[:, None], before, closing).min(axis=1, initial=ACCELERATION)
         to_stop = np.where(np.isnan(now.stop), np.inf, np.maximum(now.stop - now.s, 0.0))
-        rate = np.minimum(rate, (np.sqrt(2 * _BRAKING * to_stop) - now.v) / 0.25)
-        v = np.where(standing, 0.0, np.maximum(now.v + np.clip(rate, -_HARDEST, _ACCELERATION) * dt, 0.0))
+        rate = np.minimum(rate, (np.sqrt(2 * BRAKING * to_stop) - now.v) / 0.25)
+        v = np.where(standing, 0.0, np.maximum(now.v + np.clip(rate, -_HARDEST, ACCELERATION) * dt, 0.0))
         fastest = np.minimum(0.12 * v + 0.3, 1.1)  # slow riders steer little
         wish = np.clip(1.4 * (now.aim - now.d), -fastest, fastest)
         u = now.u + np.clip(wish - now.u, -_STEER * dt, _STEER * dt)
-        right, left = _space(now)
+        right, left = space(now)
         u = np.where(standing, 0.0, np.clip(u, -0.5 * right / dt, 0.5 * left / dt))
-        s, d = _apart(now, now.s + now.way * v * dt, now.d + u * dt)
+        s, d = apart(now, now.s + now.way * v * dt, now.d + u * dt)
         stayed = s == now.s
         v, moved = np.where(stayed, 0.0, v), (d - now.d) / dt
         yaw = np.clip(np.arctan2(moved, np.maximum(v, 2.5)), -_TURN, _TURN)
@@ -363,62 +307,3 @@ class RiderTraffic:
             yaw=now.yaw + (yaw - now.yaw) * min(1.0, 6 * dt),
             lean=now.lean + (lean - now.lean) * min(1.0, 5 * dt),
         )
-
-
-def _idm(v: Floats, wanted: Floats, gap: Floats, closing: Floats) -> Floats:
-    """Acceleration of the intelligent driver model, m/s^2; an infinite gap is a free road.
-
-    Who is cut in on brakes firmly, and harder only where that would not do.
-    """
-    dynamic = v * _TIME_GAP + v * closing / (2 * np.sqrt(_ACCELERATION * _BRAKING))
-    room = np.maximum(gap, 0.05)
-    ratio = (_STANDSTILL + np.maximum(dynamic, 0.0)) / room
-    rate = _ACCELERATION * (1 - (v / np.maximum(wanted, 0.1)) ** 4 - ratio**2)
-    needed = np.maximum(closing, 0.0) ** 2 / (2 * np.maximum(gap - 0.4, 0.05))
-    return np.asarray(np.maximum(rate, -np.maximum(_FIRM, 1.2 * needed)))
-
-
-def _ahead(now: _Riders) -> tuple[Floats, Floats]:
-    """Give the free metres (N, N) from each rider to each one before it, else infinite, and how fast they close."""
-    along = now.way[:, None] * (now.s[None, :] - now.s[:, None])
-    gap = along - now.half[:, None, 0] - now.half[None, :, 0]
-    closing = now.v[:, None] - now.v[None, :] * now.way[:, None] * now.way[None, :]
-    before = (along > 0) & (gap < _SIGHT + 2.0 * np.maximum(closing - 4.0, 0.0))
-    return np.where(before, gap, np.inf), closing
-
-
-def _space(now: _Riders) -> tuple[Floats, Floats]:
-    """Give the free metres to the right and to the left of each rider, between those who could not brake."""
-    apart = np.abs(now.s[None, :] - now.s[:, None]) - now.half[:, None, 0] - now.half[None, :, 0]
-    speed = now.way * now.v
-    nearer = (speed[:, None] - speed[None, :]) * np.sign(now.s[None, :] - now.s[:, None])
-    ahead = now.s[None, :] > now.s[:, None]
-    behind = np.where(ahead == (now.way > 0)[:, None], now.v[:, None], now.v[None, :])
-    beside = apart < 0.7 + 0.2 * behind + np.maximum(nearer, 0.0) ** 2 / (2 * _BRAKING)
-    np.fill_diagonal(beside, False)
-    across = now.d[None, :] - now.d[:, None]
-    free = np.maximum(np.abs(across) - now.half[:, None, 1] - now.half[None, :, 1] - _SIDE, 0.0)
-    right = np.where(beside & (across <= 0), free, np.inf).min(axis=1, initial=np.inf)
-    left = np.where(beside & (across >= 0), free, np.inf).min(axis=1, initial=np.inf)
-    return right, left
-
-
-def _apart(now: _Riders, s: Floats, d: Floats) -> tuple[Floats, Floats]:
-    """Take back moves after which bodies would touch: first to the side, then ahead; who was apart stays so."""
-    s, d = s.copy(), d.copy()
-    length = now.half[:, None, 0] + now.half[None, :, 0]
-    width = now.half[:, None, 1] + now.half[None, :, 1]
-    for places, before in ((d, now.d), (s, now.s)):
-        while True:
-            touch = (np.abs(s[None, :] - s[:, None]) < length) & (np.abs(d[None, :] - d[:, None]) < width)
-            np.fill_diagonal(touch, False)
-            moved = touch.any(axis=1) & (places != before)
-            if not moved.any():
-                break
-            # Of two in line the one behind waits.
-            if places is s:
-                rear = touch & (now.way[:, None] * (now.s[None, :] - now.s[:, None]) > 0)
-                waiting = moved & rear.any(axis=1)
-                moved = waiting if waiting.any() else moved
-            places[moved] = before[moved]
-    return s, d

@@ -1,4 +1,4 @@
-"""What the weather does from tick to tick: clouds that pass, light that comes on at once, plants in the wind."""
+"""What the weather does from tick to tick: passing clouds, light that comes on, plants in the wind."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ _WAVES = 4
 class ChangingLight:
     """The light of an episode as a function of time.
 
-    Clouds that pass are a sum of slow waves, which take up to `LaneLightParams.passing` of the sun's light and
-    a third as much of the sky's.
+    Clouds that pass are a sum of slow waves, which take up to `LaneLightParams.passing` of the sun's light
+    and a third as much of the sky's.
 
     Args:
         params: Which changes there are.
@@ -52,8 +52,7 @@ class ChangingLight:
 class Wind:
     """How the plants among some scenery lean, as a function of time.
 
-    Every plant swings about a lean to leeward at its own pace, the more the smaller it is in proportion; gusts
-    run through all of them.
+    Every plant swings about a lean to leeward at its own pace, a tall one slowly; gusts run through all.
 
     Args:
         scenery: What stands there.

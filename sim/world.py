@@ -75,8 +75,8 @@ class Bodies:
         sizes: (N, 3) float64, metres: length (along the heading), width, height.
         colours: (N, 3) float32 in [0, 1]: sRGB paint; models decide where it shows.
         lamps: (N,) uint8, `Lamps` that are on.
-        leans: (N, 2) float64, metres east and north by which a metre of height stands aside: a rider in a bend,
-            a tree in the wind.
+        leans: (N, 2) float64, metres east and north by which a metre of height stands aside: a rider in a
+            bend, a tree in the wind.
     """
 
     ids: NDArray[np.uint32]
@@ -165,7 +165,8 @@ class WorldState:
         vehicles: Every vehicle but the ego, parked ones too.
         ego: The camera car, or None where the camera is on none.
         lighting: How the light differs from the scene's.
-        sway: (S, 2) how the scene's S pieces of scenery lean, as `Bodies.leans`, or None where the air is still.
+        sway: (S, 2) how the scene's S pieces of scenery lean, as `Bodies.leans`, or None where the air is
+            still.
     """
 
     tick: int

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from scenarios.log import EpisodeLog
-from scenarios.score.identification import CLASSES, JudgedTrace
 from scenarios.score.frames import scored_frames
+from scenarios.score.identification import CLASSES, JudgedTrace
 from scenarios.score.params import Boxes, ScoringParams
 from sim.truth.events import occlusion_events
 from tracker.boxes import intersection
@@ -28,10 +28,11 @@ def difficulty(
         params: Thresholds.
 
     Returns:
-        ``scored_objects`` and ``scored_boxes`` (those objects' in all frames); in-car ``traces`` by their true
-        class, null if the tracker shows none, on the lane ``riders_in_view``; ``overlapping_pairs`` of scored objects whose boxes meet in
-        some frame; and ``events`` by kind: how often an object was hidden that had been scored within the
-        second before, how often it was seen again, and the median of the seconds it then had been hidden.
+        ``scored_objects`` and ``scored_boxes`` (those objects' in all frames); in-car ``traces`` by their
+        true class, null if the tracker shows none, on the lane ``riders_in_view``; ``overlapping_pairs`` of
+        scored objects whose boxes meet in some frame; and ``events`` by kind: how often an object was hidden
+        that had been scored within the second before, how often it was seen again, and the median of the
+        seconds it then had been hidden.
     """
     scored_at: dict[int, list[int]] = defaultdict(list)
     pairs: set[tuple[int, int]] = set()

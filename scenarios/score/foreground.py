@@ -15,7 +15,7 @@ from sim.truth.standing import Standing
 
 
 def foreground_f(log: EpisodeLog, frames: Sequence[ScoredFrame], params: ScoringParams) -> float | None:
-    """Give the F measure of all masks together; shadows are background, what has long stood does not count."""
+    """Give the F measure of all masks; shadows are background, what has long stood does not count."""
     mask_px, object_px = log.shown.mask_px, log.shown.object_px
     if mask_px is None or object_px is None:
         return None
@@ -34,8 +34,8 @@ def foreground_f(log: EpisodeLog, frames: Sequence[ScoredFrame], params: Scoring
 def absorption_seconds(log: EpisodeLog, params: ScoringParams) -> float | None:
     """Give the mean seconds from a rider's standstill until it has left the mask for as long as it stands.
 
-    Riders that stand for `ScoringParams.standing_seconds` count; those that were not in the mask at all, or are
-    never absorbed, do not, and None is given where there is no other.
+    Riders that stand for `ScoringParams.standing_seconds` count; those that were not in the mask at all, or
+    are never absorbed, do not, and None is given where there is no other.
     """
     if log.shown.mask_px is None or log.shown.object_px is None:
         return None
@@ -60,7 +60,7 @@ def absorption_seconds(log: EpisodeLog, params: ScoringParams) -> float | None:
 
 
 def recovery_seconds(log: EpisodeLog, params: ScoringParams) -> float | None:
-    """Give the mean seconds from a sudden change of light until the mask holds little of the background again.
+    """Give the mean seconds from a sudden change of light until the mask holds little background again.
 
     One that it never gets over counts with all the seconds until the next change or the end. None where the
     light never changes at once.

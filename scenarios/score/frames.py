@@ -37,7 +37,9 @@ class ScoredFrame:
     standing: NDArray[np.float64]
 
 
-def scored_frames(log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams) -> Iterator[ScoredFrame]:
+def scored_frames(
+    log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams
+) -> Iterator[ScoredFrame]:
     """Yield the frames that count: all of the in-car scene, those after the training of the lane."""
     lane = log.scene == "motorcycle-lane"
     clock = Standing(log.rate)

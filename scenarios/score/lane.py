@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from scenarios.log import EpisodeLog
-from scenarios.score.frames import ScoredFrame, scored_frames
 from scenarios.score.foreground import absorption_seconds, foreground_f, recovery_seconds
+from scenarios.score.frames import ScoredFrame, scored_frames
 from scenarios.score.params import Boxes, ScoringParams
 from scenarios.score.preprocess import clip, confirmed, kept_tracks
 from sim.world import Role
@@ -65,9 +65,7 @@ def detection(
     return hits / claimed if claimed else None, hits / wanted if wanted else None
 
 
-def matches(
-    scored: Floats, found: Floats, threshold: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def matches(scored: Floats, found: Floats, threshold: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Match boxes one to one, for the greatest sum of IoU, none below ``threshold``: rows and columns."""
     overlap = iou(scored, found)
     worth = np.where(overlap >= threshold, overlap, 0.0)
@@ -162,7 +160,9 @@ def wrong_way(
     for frame_pairs in pairs:
         for rider, track in frame_pairs:
             owners[track][rider] += 1
-    owner = {track: max(owners[track], key=lambda r: (owners[track][r], -r)) for track in flagged & owners.keys()}
+    owner = {
+        track: max(owners[track], key=lambda r: (owners[track][r], -r)) for track in flagged & owners.keys()
+    }
     return {
         "present": present,
         "flagged": len({owner[track] for track in owner if owner[track] in strays & counted}),

@@ -67,7 +67,7 @@ def select_riders(
 
     Args:
         truth: Of the frame.
-        standing: (N,) seconds that each rider has stood still; after a while it is background (scoring.md 15).
+        standing: (N,) seconds that each rider has stood; after a while it is ignored (scoring.md 15).
         width: Of the frame, px.
         height: Of the frame, px.
         boxes: Which boxes are scored.
@@ -144,4 +144,3 @@ def confirmed(tracks: Tracks, width: int, height: int) -> tuple[NDArray[np.int64
     """Give ids (P,) and boxes (P, 4), cut off at the frame's border, of the confirmed tracks."""
     chosen = tracks.status == Status.CONFIRMED
     return tracks.ids[chosen], clip(tracks.boxes[chosen], width, height)
-

@@ -75,7 +75,12 @@ class _Tailor(MeshBuilder):
             self.prism(start, end, (low, high), surface, sides=sides)
 
     def loft(
-        self, rings: Sequence[tuple[Point, float, float]], surface: Surface, sides: int, *, capped: bool = True
+        self,
+        rings: Sequence[tuple[Point, float, float]],
+        surface: Surface,
+        sides: int,
+        *,
+        capped: bool = True,
     ) -> None:
         """Add a skin over level ellipses: centre, half length along x, half width along y, from below."""
         turn = 2 * np.pi * np.arange(sides + 1) / sides
@@ -96,7 +101,11 @@ class _Tailor(MeshBuilder):
         x, y, z = centre
         lifts = np.linspace(-0.45, 0.47, rows + 1) * np.pi
         rings = [
-            ((x, y, z + radii[2] * float(np.sin(t))), radii[0] * float(np.cos(t)), radii[1] * float(np.cos(t)))
+            (
+                (x, y, z + radii[2] * float(np.sin(t))),
+                radii[0] * float(np.cos(t)),
+                radii[1] * float(np.cos(t)),
+            )
             for t in lifts
         ]
         self.loft(rings, surface, sides)
@@ -151,14 +160,15 @@ def _person(b: _Tailor, hip: float, jacket: Surface, helmet: Slot, *, detail: in
 def _machine(b: _Tailor, *, detail: int, fat: float) -> None:
     """Add a machine with a step-through frame: ``fat`` is the half width of its rear."""
     sides = (5, 9)[detail]
+    aside = np.array([0.0, 0.045, 0.0])  # half the width of a tyre
     for x in (-0.62, 0.63):
         turn = 2 * np.pi * np.arange(sides) / sides
         rim = np.stack([x + 0.29 * np.cos(turn), np.zeros(sides), 0.29 + 0.29 * np.sin(turn)], axis=1)
         b.slot = Slot.BLACK
         for side in (1.0, -1.0):
-            b.polygon(rim + [0, side * 0.045, 0], Surface.PALETTE, facing=(0, side, 0))
+            b.polygon(rim + side * aside, Surface.PALETTE, facing=(0, side, 0))
         ring = np.concatenate([rim, rim[:1]])
-        b.grid(np.stack([ring - [0, 0.045, 0], ring + [0, 0.045, 0]]), Surface.PALETTE, inside=(x, 0, 0.29))
+        b.grid(np.stack([ring - aside, ring + aside]), Surface.PALETTE, inside=(x, 0, 0.29))
     b.slot = Slot.MACHINE
     b.loft(
         [((-0.42, 0, 0.46), 0.34, 0.6 * fat), ((-0.46, 0, 0.62), 0.44, fat), ((-0.40, 0, 0.76), 0.42, fat)],
@@ -174,8 +184,8 @@ def _machine(b: _Tailor, *, detail: int, fat: float) -> None:
     b.limb([(0.44, -0.35, 1.03), (0.44, 0.35, 1.03)], (0.025, 0.025), Surface.PALETTE, 3)
     if detail:
         for side in (1.0, -1.0):
-            b.limb([(0.44, side * 0.27, 1.03), (0.42, side * 0.37, 1.17)], (0.012, 0.012), Surface.PALETTE, 3)
-            b.box((0.40, side * 0.37 - 0.05, 1.15), (0.43, side * 0.37 + 0.05, 1.22), Surface.PALETTE)
+            b.limb([(0.44, side * 0.27, 1.03), (0.42, side * 0.33, 1.17)], (0.012, 0.012), Surface.PALETTE, 3)
+            b.box((0.40, side * 0.33 - 0.05, 1.15), (0.43, side * 0.33 + 0.05, 1.22), Surface.PALETTE)
         b.prism((-0.55, -0.17, 0.30), (-0.95, -0.19, 0.40), (0.05, 0.06), Surface.CHROME, sides=5, caps=True)
     b.slot = Slot.MACHINE
     b.box((0.42, -0.11, 0.90), (0.56, 0.11, 1.06), Surface.PALETTE)
@@ -219,7 +229,9 @@ def _sacks(b: _Tailor, detail: int) -> None:
     _person(b, -0.08, Surface.FABRIC, Slot.HELMET, detail=detail, pillion=False)
     b.slot = Slot.LOAD
     for side in (1.0, -1.0):
-        b.ball((-0.62, side * 0.31, 0.62), (0.34, 0.17, 0.29), Surface.PALETTE, (5, 8)[detail], (3, 4)[detail])
+        b.ball(
+            (-0.62, side * 0.31, 0.62), (0.34, 0.17, 0.29), Surface.PALETTE, (5, 8)[detail], (3, 4)[detail]
+        )
 
 
 _SHAPES: tuple[tuple[str, Callable[[_Tailor, int], None], int], ...] = (

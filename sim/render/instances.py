@@ -180,7 +180,10 @@ class Library:
         cos, sin = np.cos(chosen.yaws)[:, None], np.sin(chosen.yaws)[:, None]
         x, y = cos * local[..., 0] - sin * local[..., 1], sin * local[..., 0] + cos * local[..., 1]
         aside = chosen.leans[:, None, :] * local[..., 2:]
-        return np.stack([x + aside[..., 0], y + aside[..., 1], local[..., 2]], axis=-1) + chosen.positions[:, None]
+        return (
+            np.stack([x + aside[..., 0], y + aside[..., 1], local[..., 2]], axis=-1)
+            + chosen.positions[:, None]
+        )
 
     def commands(self, meshes: NDArray[np.int32]) -> NDArray[np.void]:
         """Return one `COMMAND` for each run of equal meshes in (M,) ``meshes``."""

@@ -17,7 +17,7 @@ from sim.render.ground import MARGIN, PERIOD, cut, road_texture
 from sim.render.instances import Library
 from sim.render.types import Picture, Stage
 from sim.textures import texture_array
-from sim.world import GROUND_ID, Bodies, WorldState
+from sim.world import GROUND_ID, WorldState
 
 _ORIGIN_GRID = 256.0
 _ROUGHNESS = {

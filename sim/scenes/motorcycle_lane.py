@@ -1,9 +1,9 @@
 """Paper 3's scene: a camera that stands still above a lane of motorcycles, seen from behind.
 
-The riders are this project's own model (`sim.riders`), not highway-env's vehicles on narrow sublanes: those keep
-to the middle of a lane and change lanes whole, while motorcycles ride at any offset, squeeze through gaps and
-weave. The lane runs east from s = 0, beneath the camera's mast; it and what stands beside it are made as the
-in-car scene's road and scenery are.
+The riders are this project's own model (`sim.riders`), not highway-env's vehicles on narrow sublanes: those
+keep to the middle of a lane and change lanes whole, while motorcycles ride at any offset, squeeze through
+gaps and weave. The lane runs east from s = 0, beneath the camera's mast; it and what stands beside it are
+made as the in-car scene's road and scenery are.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class MotorcycleLaneScene:
             rate=rate,
         )
 
-    def step(self, action: NDArray[np.float32] | None = None) -> WorldState:
+    def step(self, action: NDArray[np.float32] | None = None) -> WorldState:  # noqa: ARG002
         """Advance one tick; the first call gives tick 0. Nobody takes actions here."""
         if self._tick >= 0:
             self._riders.step()
@@ -101,7 +101,7 @@ class MotorcycleLaneScene:
             sway=self._wind.at(time),
         )
 
-    def pose(self, state: WorldState) -> Pose:
+    def pose(self, state: WorldState) -> Pose:  # noqa: ARG002
         """Return the camera's pose: always the same."""
         return self._pose
 

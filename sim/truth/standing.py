@@ -12,14 +12,14 @@ STILL = 0.1
 
 
 class Standing:
-    """Follows how long each vehicle has stood still before a camera that does not move; give it every frame."""
+    """Follows how long each vehicle has stood before a camera that does not move; give it every frame."""
 
     def __init__(self, rate: float) -> None:
         self._rate = rate
         self._since: dict[int, int] = {}
 
     def seconds(self, truth: FrameTruth) -> NDArray[np.float64]:
-        """Take in the next frame; return (N,) seconds that each of its vehicles has stood, 0 while it moves."""
+        """Take in the next frame; return (N,) seconds that each vehicle has stood, 0 while it moves."""
         still = np.sqrt((truth.velocities**2).sum(axis=1)) < STILL
         since = {
             vehicle: self._since.get(vehicle, truth.tick)
@@ -28,4 +28,4 @@ class Standing:
         }
         self._since = since
         now = truth.tick
-        return np.array([(now - since.get(vehicle, now)) / self._rate for vehicle in truth.ids.tolist()], float)
+        return np.array([(now - since.get(row, now)) / self._rate for row in truth.ids.tolist()], float)

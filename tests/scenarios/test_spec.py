@@ -61,7 +61,10 @@ def test_the_digest_follows_what_a_drive_depends_on_and_nothing_else(tmp_path):
 
 def test_the_schema_describes_the_file():
     schema = spec.json_schema()
-    assert {option["$ref"].rpartition("/")[2] for option in schema["oneOf"]} == {"InCarFile", "MotorcycleLaneFile"}
+    assert {option["$ref"].rpartition("/")[2] for option in schema["oneOf"]} == {
+        "InCarFile",
+        "MotorcycleLaneFile",
+    }
     for name, table in (("InCarFile", "road"), ("MotorcycleLaneFile", "riders")):
         file = schema["$defs"][name]
         assert {"scene", "seconds", "rate", "sensor", table} <= set(file["properties"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -61,7 +63,9 @@ def test_the_check_sees_an_overlap():
     parked=st.integers(0, 2),
 )
 def test_no_two_riders_ever_overlap(seed, riders, speed, width, wrong, parked):
-    params = RiderParams(riders=riders, speed=speed, speed_spread=0.25 * speed, wrong_way=wrong, parked=parked)
+    params = RiderParams(
+        riders=riders, speed=speed, speed_spread=0.25 * speed, wrong_way=wrong, parked=parked
+    )
     for state in ride(params, seed, 150, (-width, 0.0))[::5]:
         assert overlapping(state) == []
 
@@ -76,7 +80,7 @@ def test_same_seed_same_ride_and_another_seed_another():
 
 def test_riders_move_as_their_velocities_say_and_never_jump():
     states = ride(RiderParams(riders=30, speed=5.0), 3, 90)
-    for before, after in zip(states, states[1:], strict=False):
+    for before, after in itertools.pairwise(states):
         _, old, new = np.intersect1d(before.ids, after.ids, return_indices=True)
         moved = after.positions[new] - before.positions[old]
         assert np.allclose(moved * RATE, after.velocities[new], atol=1e-6)
@@ -117,6 +121,6 @@ def test_one_comes_the_wrong_way_through_the_view(seed):
     places = [float(x[0]) for x in strays if len(x)]
     assert places[0] > 40
     assert min(places) < 25
-    assert all(b <= a + 1e-9 for a, b in zip(places, places[1:], strict=False))
+    assert all(b <= a + 1e-9 for a, b in itertools.pairwise(places))
     backward = [b.velocities[b.roles == Role.SAME_WAY, 0] for b in states]
     assert all((v >= 0).all() for v in backward)

@@ -26,7 +26,8 @@ def test_clouds_dim_the_sun_over_seconds():
 def test_the_sun_comes_out_from_one_frame_to_the_next():
     light = ChangingLight(LaneLightParams(flash="sun", flash_at=2.0), 0)
     before, after = light.at(59 / 30), light.at(60 / 30)
-    assert np.allclose(before.sun, SHADED) and np.allclose(after.sun, 1.0)
+    assert np.allclose(before.sun, SHADED)
+    assert np.allclose(after.sun, 1.0)
     assert before.sky == after.sky
 
 

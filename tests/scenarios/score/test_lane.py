@@ -146,7 +146,7 @@ def masks(mask_px, object_px) -> ShownLog:
 
 
 def test_foreground_f_leaves_out_training_missing_masks_and_who_stands():
-    # Riders have 1000 visible pixels. Scored: 800 of them in a mask of 1000, twice: F = 1600 * 2 / (2000 + 2000).
+    # Riders have 1000 visible pixels. Scored: 800 of them in a mask of 1000, twice: F = 3200 / (2000 + 2000).
     cars = [[rider()]] * 5
     shown = masks([0, 0, 1000, NO_MASK, 1000], [[0], [0], [800], [0], [800]])
     assert lane(cars, shown=shown)[0]["detection"]["foreground_f"] == pytest.approx(0.8)
@@ -158,7 +158,7 @@ def test_foreground_f_leaves_out_training_missing_masks_and_who_stands():
 
 def test_seconds_until_what_stands_is_absorbed():
     cars = [[rider(speed=5.0)]] * 5 + [[rider(speed=0.0)]] * 50 + [[rider(speed=5.0)]] * 5
-    # It stands from frame 5 on; its last frame with more than a fifth in the mask is 24: absorbed at 25, after 2 s.
+    # It stands from frame 5 on; the last with more than a fifth in the mask is 24: absorbed at 25, after 2 s.
     share = [1000] * 20 + [150, 150, 150, 150, 210] + [200] * 30 + [1000] * 5
     shown = masks(share, [[count] for count in share])
     assert lane(cars, shown=shown)[0]["absorbed_s"] == pytest.approx(2.0)
