@@ -16,6 +16,7 @@ from tracker.types import Frame, Info, Intrinsics, Odometry, Traces
 if TYPE_CHECKING:
     from sim.camera import Camera
     from sim.simulation import Observation
+    from sim.world import Lighting
 
 NEAR_PX = 3.0
 """A point this near to a pixel of a vehicle is the vehicle's (scoring.md 7)."""
@@ -66,6 +67,11 @@ def tracker_frame(observation: Observation, *, odometry: bool) -> Frame:
         time=observation.time,
         odometry=Odometry(speed=measured.speed, yaw_rate=measured.yaw_rate) if measured else None,
     )
+
+
+def light_level(lighting: Lighting) -> float:
+    """Return how much light of sun and sky there is, 1 where it is the scene's own."""
+    return (sum(lighting.sun) + sum(lighting.sky)) / 6
 
 
 def point_owners(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.files import moved_in
+from scenarios.shown import ShownLog, from_arrays, to_arrays
 from sim.truth.types import FrameTruth
 from tracker.types import Tracks
 
@@ -58,6 +59,7 @@ class EpisodeLog:
 
     Attributes:
         scenario: Its name.
+        scene: Which scene it is of; it decides what is scored.
         spec_id: Digest of the resolved scenario.
         seed: The episode's.
         tracker: Its name.
@@ -68,12 +70,15 @@ class EpisodeLog:
         truth: T frames of truth.
         tracks: T frames of tracks.
         traces: Of a tracker that shows them.
+        shown: What else it showed.
         ego_speed: (T,) float64, m/s; not a number where the camera is on no car.
+        light: (T,) float64, the light of sun and sky, 1 where it is the scene's own.
         hashes: Hex digests by name: truth, frames, tracks.
         timing_ms: (T,) float64 by stage: world, render, sensor, truth, track.
     """
 
     scenario: str
+    scene: str
     spec_id: str
     seed: int
     tracker: str
@@ -84,13 +89,15 @@ class EpisodeLog:
     truth: tuple[FrameTruth, ...]
     tracks: tuple[Tracks, ...]
     traces: TraceLog | None
+    shown: ShownLog
     ego_speed: NDArray[np.float64]
+    light: NDArray[np.float64]
     hashes: dict[str, str]
     timing_ms: dict[str, NDArray[np.float64]]
 
 
-_FORMAT = "testtrack episode 1"
-_PLAIN = ("scenario", "spec_id", "seed", "tracker", "rate", "width", "height", "has_boxes", "hashes")
+_FORMAT = "testtrack episode 2"
+_PLAIN = ("scenario", "scene", "spec_id", "seed", "tracker", "rate", "width", "height", "has_boxes", "hashes")
 _TRUTH_ARRAYS = tuple(f.name for f in fields(FrameTruth) if f.name != "tick")
 _TRACK_ARRAYS = ("ids", "boxes", "status")
 _OPTIONAL_TRACK_ARRAYS = {"score": (), "state": (4,), "covariance": (4, 4)}
@@ -109,6 +116,7 @@ def save(log: EpisodeLog, path: Path | str) -> None:
     arrays: dict[str, Any] = {
         "plain": np.frombuffer(json.dumps(plain).encode(), np.uint8),
         "ego_speed": log.ego_speed,
+        "light": log.light,
         "truth/ticks": np.array([frame.tick for frame in log.truth], np.int64),
         "truth/rows": np.array([len(frame) for frame in log.truth], np.int64),
         "tracks/rows": np.array([len(frame) for frame in log.tracks], np.int64),
@@ -128,6 +136,7 @@ def save(log: EpisodeLog, path: Path | str) -> None:
     if log.traces is not None:
         columns = {f"traces/{f.name}": getattr(log.traces, f.name) for f in fields(TraceLog)}
         arrays |= {name: column for name, column in columns.items() if column is not None}
+    arrays |= {f"shown/{name}": values for name, values in to_arrays(log.shown).items()}
     arrays |= {f"timing_ms/{name}": values for name, values in log.timing_ms.items()}
     with moved_in(Path(path)) as part, part.open("wb") as file:
         np.savez_compressed(file, **arrays)
@@ -185,7 +194,9 @@ def _read(arrays: Mapping[str, NDArray[Any]]) -> EpisodeLog:
         truth=tuple(truth),
         tracks=tuple(tracks),
         traces=TraceLog(**_under("traces/", arrays)) if with_traces else None,
+        shown=from_arrays(_under("shown/", arrays)),
         ego_speed=speed,
+        light=arrays["light"],
         timing_ms=_under("timing_ms/", arrays),
     )
 

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from scenarios import bridge
 from scenarios.log import EpisodeLog, TraceLog
+from scenarios.shown import ShownRows
 from scenarios.spec import Scenario, spec_id
+from sim.params import InCarParams
 from tracker.base import Tracker
 from tracker.types import Diagnostics, Frame, Info, Traces, Tracks
 
 if TYPE_CHECKING:
-    from sim.simulation import Observation
+    from sim.simulation import Observation, Scene
 
 OnFrame = Callable[["Observation", Mapping[str, tuple[Tracks, Diagnostics]]], None]
 """Is shown each frame with what every tracker made of it, by the tracker's name."""
@@ -50,11 +52,10 @@ def run_episode(
     Raises:
         RenderUnavailableError: If there is no off-screen OpenGL here.
     """
-    from sim.scenes.in_car import InCarScene  # with the traffic, the meshes and the renderer: heavy
     from sim.simulation import Simulation
 
-    scene = InCarScene(scenario.in_car, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
-    with Simulation(scene, scenario.in_car.sensor, seed=seed) as simulation:
+    scene = make_scene(scenario, seed)
+    with Simulation(scene, scenario.params.sensor, seed=seed) as simulation:
         return track_observations(
             simulation.run(scenario.frames),
             scenario,
@@ -64,6 +65,17 @@ def run_episode(
             odometry=odometry,
             on_frame=on_frame,
         )
+
+
+def make_scene(scenario: Scenario, seed: int) -> Scene:
+    """Populate the world of a scenario for one seed."""
+    # With the traffic and the meshes: heavy.
+    from sim.scenes.in_car import InCarScene
+    from sim.scenes.motorcycle_lane import MotorcycleLaneScene
+
+    if isinstance(scenario.params, InCarParams):
+        return InCarScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
+    return MotorcycleLaneScene(scenario.params, seed=seed, rate=scenario.rate)
 
 
 def track_observations(
@@ -80,7 +92,7 @@ def track_observations(
 
     Observations are taken one by one and not kept: memory grows by the logs alone.
     """
-    truths, ego_speed = [], []
+    truths, ego_speed, light = [], [], []
     shared_ms: dict[str, list[float]] = {stage: [] for stage in _SHARED_STAGES}
     truth_hash, frames_hash = hashlib.sha256(), hashlib.sha256()
     logs = {name: TrackerLog(tracker) for name, tracker in trackers.items()}
@@ -92,6 +104,7 @@ def track_observations(
         ego = observation.state.ego
         truths.append(observation.truth)
         ego_speed.append(np.nan if ego is None else ego.speed)
+        light.append(bridge.light_level(observation.state.lighting))
         _digest(truth_hash, observation.truth)
         _digest(frames_hash, observation.image)
         for stage in _SHARED_STAGES:
@@ -109,6 +122,7 @@ def track_observations(
     return [
         EpisodeLog(
             scenario=scenario.name,
+            scene=scenario.scene,
             spec_id=spec_id(scenario),
             seed=seed,
             tracker=name,
@@ -119,7 +133,9 @@ def track_observations(
             truth=tuple(truths),
             tracks=tuple(log.tracks),
             traces=log.traces.finish(),
+            shown=log.shown.finish(),
             ego_speed=np.array(ego_speed, float),
+            light=np.array(light, float),
             hashes={**hashes, "tracks": log.digest.hexdigest()},
             timing_ms={
                 stage: np.array(ms, float)
@@ -142,6 +158,7 @@ class TrackerLog:
         tracker: Started by whoever made this.
         tracks: Of each frame.
         traces: Rows of a `TraceLog`, where the truth is known.
+        shown: What else it shows, likewise.
         digest: SHA-256 of all tracks and traces.
         track_ms: Milliseconds that each step took.
         log_ms: Milliseconds that it took to keep each.
@@ -151,6 +168,7 @@ class TrackerLog:
         self.tracker = tracker
         self.tracks: list[Tracks] = []
         self.traces = _TraceRows()
+        self.shown = ShownRows()
         self.digest = hashlib.sha256()
         self.track_ms: list[float] = []
         self.log_ms: list[float] = []
@@ -171,6 +189,8 @@ class TrackerLog:
         tracks = _copied(tracks)
         self.tracks.append(tracks)
         _digest(self.digest, tracks)
+        if observation is not None:
+            self.shown.add(diagnostics, observation.ids, observation.truth)
         if diagnostics.traces is not None:
             traces = _copied(diagnostics.traces)
             _digest(self.digest, traces)

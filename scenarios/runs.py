@@ -159,9 +159,16 @@ def _summarise(run: Run, directory: Path, document: Document) -> None:
 def _recorder(run: Run, seed: int, tracker: str, folder: Path) -> Recorder:
     from scenarios.report.recorder import Recorder  # plots and video: only where a report is wanted
 
-    camera = run.scenario.in_car.camera
+    camera = run.scenario.params.camera
     title = f"{run.scenario.name}, seed {seed}: {tracker}"
-    return Recorder(folder, width=camera.width, height=camera.height, rate=run.scenario.rate, title=title)
+    return Recorder(
+        folder,
+        width=camera.width,
+        height=camera.height,
+        rate=run.scenario.rate,
+        title=title,
+        scene=run.scenario.scene,
+    )
 
 
 def _keep(run: Run, log: EpisodeLog, document: Document, recorder: Recorder) -> None:

@@ -8,18 +8,20 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from scenarios.errors import InputError
-from sim.params import InCarParams, Params
+from sim.params import InCarParams, MotorcycleLaneParams, Params
 
 Seconds = Annotated[FiniteFloat, Field(gt=0, le=3600)]
 Rate = Annotated[int, Field(ge=1, le=240)]
+SceneName = Literal["in-car", "motorcycle-lane"]
 
 _BARE_WORD = re.compile(r"[A-Za-z][\w-]*")
 _KEY = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_][\w-]*)*")
@@ -38,15 +40,15 @@ class Scenario(Params):
         scene: Which scene the parameters are of.
         seconds: Length of an episode.
         rate: Frames a second.
-        in_car: The scene's parameters.
+        params: The scene's parameters.
     """
 
     name: str
     description: str = ""
-    scene: Literal["in-car"]
+    scene: SceneName
     seconds: Seconds = 20.0
     rate: Rate = 30
-    in_car: InCarParams = InCarParams()
+    params: InCarParams | MotorcycleLaneParams
 
     @property
     def frames(self) -> int:
@@ -63,6 +65,31 @@ class InCarFile(InCarParams):
     description: str = ""
     seconds: Seconds = 20.0
     rate: Rate = 30
+
+
+class MotorcycleLaneFile(MotorcycleLaneParams):
+    """The layout of a scenario file of the motorcycle lane: these keys, then the scene's tables."""
+
+    model_config = ConfigDict(title="testtrack scenario")
+
+    scene: Literal["motorcycle-lane"]
+    description: str = ""
+    seconds: Seconds = 11.0
+    rate: Rate = 30
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """How the scenarios of one scene are written down: the whole file, and the scene's tables in it."""
+
+    file: type[InCarFile] | type[MotorcycleLaneFile]
+    params: type[InCarParams] | type[MotorcycleLaneParams]
+
+
+_LAYOUTS: dict[str, _Layout] = {
+    "in-car": _Layout(InCarFile, InCarParams),
+    "motorcycle-lane": _Layout(MotorcycleLaneFile, MotorcycleLaneParams),
+}
 
 
 def library() -> dict[str, str]:
@@ -90,37 +117,41 @@ def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise SpecError(f"{where}: not TOML: {_one_line(str(error))}") from error
-    overridden = {}
+    set_by = {}
     for override in overrides:
         key, value = _parse_override(override)
         _put(data, key, value, override)
-        overridden[key] = override
+        set_by[key] = override
+    layout = _layout(data, where)
     try:
-        checked = InCarFile.model_validate(data, strict=True)
+        checked = layout.file.model_validate(data, strict=True)
     except ValidationError as error:
-        raise SpecError(_explain(error.errors()[0], where, overridden)) from error
-    _check_together(checked, where)
-    sections = {field: getattr(checked, field) for field in InCarParams.model_fields}
+        raise SpecError(_explain(error.errors()[0], where, set_by, layout)) from error
+    if isinstance(checked, InCarFile):
+        _check_together(checked, where)
+    sections = {field: getattr(checked, field) for field in layout.params.model_fields}
     return Scenario(
         name=name,
         description=checked.description,
         scene=checked.scene,
         seconds=checked.seconds,
         rate=checked.rate,
-        in_car=InCarParams(**sections),
+        params=layout.params(**sections),
     )
 
 
 def spec_id(scenario: Scenario) -> str:
     """Return a digest of all that a drive depends on besides the seed: not of name and description."""
-    resolved = scenario.model_dump(mode="json", exclude={"name", "description"})
+    resolved = scenario.model_dump(mode="json", exclude={"name", "description", "params"})
+    resolved[scenario.scene.replace("-", "_")] = scenario.params.model_dump(mode="json")
     text = json.dumps(resolved, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON schema of a scenario file, for editors that complete and check TOML."""
-    return InCarFile.model_json_schema()
+    file = Annotated[InCarFile | MotorcycleLaneFile, Field(discriminator="scene")]
+    return {"title": "testtrack scenario"} | TypeAdapter[Any](file).json_schema()
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -162,45 +193,57 @@ def _parse_override(override: str) -> tuple[str, Any]:
         ) from error
 
 
+def _layout(data: Mapping[str, Any], where: str) -> _Layout:
+    """Return the layout of the scene that a file names."""
+    if "scene" not in data:
+        raise SpecError(f"{where}: the key 'scene' is missing: wanted {' or '.join(map(repr, _LAYOUTS))}")
+    scene = data["scene"]
+    if not isinstance(scene, str) or scene not in _LAYOUTS:
+        raise SpecError(f"{where}: scene is {_short(scene)}: wanted {' or '.join(map(repr, _LAYOUTS))}")
+    return _LAYOUTS[scene]
+
+
 def _put(data: dict[str, Any], key: str, value: Any, override: str) -> None:
     *tables, last = key.split(".")
     for table in tables:
         inner = data.setdefault(table, {})
         if not isinstance(inner, dict):
+            layout = _LAYOUTS.get(str(data.get("scene")), _LAYOUTS["in-car"])
             raise SpecError(
-                f"--set {override!r}: {table!r} is no table; {nearest(table, InCarParams.model_fields)}"
+                f"--set {override!r}: {table!r} is no table; {nearest(table, layout.params.model_fields)}"
             )
         data = inner
     data[last] = value
 
 
-def _explain(problem: ErrorDetails, where: str, overridden: Mapping[str, str]) -> str:
+def _explain(problem: ErrorDetails, where: str, set_by: Mapping[str, str], layout: _Layout) -> str:
     """Turn a validation error into one line: the place, what was wrong, what was wanted."""
     path = [str(part) for part in problem["loc"]]
     key = ".".join(path)
-    for overridden_key, override in overridden.items():
-        if key == overridden_key or overridden_key.startswith(f"{key}."):
+    for set_key, override in set_by.items():
+        if key == set_key or set_key.startswith(f"{key}."):
             where = f"--set {override!r}"
     if problem["type"] == "extra_forbidden":
-        return f"{where}: unknown key {key!r}: {_nearest_key(path)}"
+        return f"{where}: unknown key {key!r}: {_nearest_key(path, layout)}"
     if problem["type"] == "missing":
         return f"{where}: the key {key!r} is missing"
     wanted = (
-        f"wanted a table of {', '.join(_fields(path))}"
+        f"wanted a table of {', '.join(_fields(path, layout))}"
         if problem["type"] == "model_type"
         else _wanted(problem["msg"])
     )
     return f"{where}: {key} is {_short(problem['input'])}: {wanted}"
 
 
-def _nearest_key(path: Sequence[str]) -> str:
+def _nearest_key(path: Sequence[str], layout: _Layout) -> str:
     """Say which key was probably meant: one of the same table, else the same word in another table."""
-    here = _fields(path[:-1])
+    here = _fields(path[:-1], layout)
+    tables = layout.params.model_fields
     if not difflib.get_close_matches(path[-1], here, n=1, cutoff=0.5):
         elsewhere = [
             f"{table}.{key}"
-            for table in InCarParams.model_fields
-            for key in getattr(InCarParams.model_fields[table].annotation, "model_fields", ())
+            for table in tables
+            for key in getattr(tables[table].annotation, "model_fields", ())
         ]
         same = [name for name in elsewhere if name.rpartition(".")[2] == path[-1]]
         if same:
@@ -216,9 +259,9 @@ def _wanted(message: str) -> str:
     )
 
 
-def _fields(path: Sequence[str]) -> list[str]:
+def _fields(path: Sequence[str], layout: _Layout) -> list[str]:
     """Return the keys of the table at ``path``; of the last table on the way where it leads to none."""
-    model: type[BaseModel] = InCarFile
+    model: type[BaseModel] = layout.file
     for part in path:
         annotation = model.model_fields[part].annotation if part in model.model_fields else None
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):

@@ -34,6 +34,8 @@ class Surface(IntEnum):
     GRASS = 17
     ASPHALT = 18
     HILL = 19
+    FABRIC = 20  # takes the body's colour; dull
+    PALETTE = 21  # stripes of plain colours: a face lies on one of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -88,7 +88,7 @@ class EgoParams(Params):
 class SceneryParams(Params):
     """What stands beside the road."""
 
-    setting: Literal["motorway", "rural", "urban"] = "motorway"
+    setting: Literal["motorway", "rural", "urban", "avenue"] = "motorway"
     corridor: Positive = 5.0
     """D of paper 1's eq. (12): scale of the empty corridor around the camera, metres."""
     density: NonNegative = 1.0
@@ -132,4 +132,87 @@ class InCarParams(Params):
     ego: EgoParams = EgoParams()
     scenery: SceneryParams = SceneryParams()
     light: LightParams = LightParams()
+    sensor: SensorParams = SensorParams()
+
+
+class LaneCameraParams(Params):
+    """The camera on a mast beside the lane; it never moves."""
+
+    width: Annotated[int, Field(ge=16, le=4096)] = 360
+    height: Annotated[int, Field(ge=16, le=4096)] = 240
+    focal: Positive = 380.0
+    """Pixels."""
+    mount_height: Positive = 7.5
+    """Metres above the ground."""
+    mount_offset: FiniteFloat = -3.5
+    """Metres to the left of the lane's middle."""
+    yaw: FiniteFloat = 0.10
+    """Radians to the left of the lane's direction."""
+    pitch: FiniteFloat = -0.43
+    """Radians, positive looks up."""
+
+
+class LaneParams(Params):
+    """The lane of motorcycles."""
+
+    width: Annotated[FiniteFloat, Field(ge=2)] = 5.0
+    """Metres that riders use."""
+    shoulder: NonNegative = 1.2
+    """Paved metres beside it."""
+
+
+class RiderParams(Params):
+    """Who rides, how densely and how fast."""
+
+    riders: Annotated[int, Field(ge=0, le=80)] = 13
+    """The most that are between the entry and the far end of the view."""
+    speed: Positive = 8.0
+    """Mean desired speed, m/s."""
+    speed_spread: NonNegative = 1.4
+    """Standard deviation of the desired speeds, m/s."""
+    weave: NonNegative = 0.35
+    """Metres by which riders swing about the offset that they like."""
+    wrong_way: Count = 0
+    """Riders who come the wrong way."""
+    wrong_way_at: Annotated[FiniteFloat, Field(ge=-3)] = -2.5
+    """Seconds from which on the first of them comes, at first out of view."""
+    parked: Count = 0
+    """Riders who stop at the kerb and leave again."""
+    parked_at: Annotated[FiniteFloat, Field(ge=-3)] = -2.5
+    """Seconds from which on the first of them pulls over; before 0 it does so already when the run begins."""
+    stand: NonNegative = 6.0
+    """Seconds that they stand."""
+
+
+class LaneSceneryParams(SceneryParams):
+    """What stands beside the lane, and how the wind moves it."""
+
+    setting: Literal["motorway", "rural", "urban", "avenue"] = "avenue"
+    corridor: Positive = 4.0
+    density: NonNegative = 3.5
+    bridges: NonNegative = 0.0
+    wind: NonNegative = 0.7
+    """How far plants sway, in hundredths of their height."""
+
+
+class LaneLightParams(LightParams):
+    """Sun and sky, and how they change while the camera looks."""
+
+    cloud: Fraction = 0.4
+    passing: Fraction = 0.0
+    """Share of the sun's light that passing clouds take, over seconds."""
+    flash: Literal["none", "sun", "lamp"] = "none"
+    """What comes on at once: the sun from behind a cloud, or a strong lamp."""
+    flash_at: NonNegative = 5.0
+    """Seconds after which it does."""
+
+
+class MotorcycleLaneParams(Params):
+    """A lane of motorcycles, seen from a camera that stands still."""
+
+    camera: LaneCameraParams = LaneCameraParams()
+    lane: LaneParams = LaneParams()
+    riders: RiderParams = RiderParams()
+    scenery: LaneSceneryParams = LaneSceneryParams()
+    light: LaneLightParams = LaneLightParams()
     sensor: SensorParams = SensorParams()

@@ -68,5 +68,6 @@ def park(
         sizes=np.array([d.size for d in draws], float),
         colours=np.array([d.colour for d in draws], np.float32),
         lamps=np.zeros(count, np.uint8),
+        leans=np.zeros((count, 2)),
     )
     return bodies, s_all.tolist()

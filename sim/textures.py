@@ -13,6 +13,26 @@ from sim.rng import stream
 Floats = NDArray[np.float64]
 
 SIZE = 256
+
+PALETTE = {
+    "black": (0.06, 0.06, 0.065),
+    "grey": (0.24, 0.25, 0.27),
+    "white": (0.90, 0.90, 0.88),
+    "silver": (0.62, 0.63, 0.65),
+    "red": (0.70, 0.08, 0.08),
+    "blue": (0.12, 0.22, 0.55),
+    "yellow": (0.86, 0.70, 0.12),
+    "green": (0.10, 0.40, 0.24),
+    "orange": (0.86, 0.40, 0.10),
+    "pink": (0.86, 0.50, 0.58),
+    "teal": (0.16, 0.52, 0.56),
+    "skin": (0.70, 0.50, 0.39),
+    "jeans": (0.20, 0.26, 0.38),
+    "khaki": (0.55, 0.48, 0.35),
+    "brown": (0.24, 0.17, 0.12),
+    "cardboard": (0.64, 0.49, 0.32),
+}
+"""Colours of the surface PALETTE, sRGB: stripes of equal width, from u = 0 on."""
 """Texels along each side of a layer."""
 
 _SEED = 20110601
@@ -23,9 +43,9 @@ def texture_array() -> NDArray[np.uint8]:
     """Make the texture of every surface.
 
     Row 0 is v = 0, the lower edge. All layers but SIGN, PLATE, TAIL_LAMP, HEAD_LAMP and RUBBER, which
-    are shown once a face, repeat without a seam. What the colour and the alpha of a layer mean:
+    are shown once a face, and PALETTE repeat without a seam. What the colour and the alpha of a layer mean:
 
-    - PAINT, CARGO, FOLIAGE, HILL: pale; they multiply the body's colour. Alpha: gloss.
+    - PAINT, CARGO, FABRIC, FOLIAGE, HILL: pale; they multiply the body's colour. Alpha: gloss.
     - SIGN: four faces, one a quarter (lower left: speed limit, lower right: warning, upper left: direction
       board, upper right: gantry board). Alpha: share of marking; shown is
       ``mix(body colour, texture, alpha)``.
@@ -33,6 +53,7 @@ def texture_array() -> NDArray[np.uint8]:
       day and may be lit at night; 4 x 4 windows a repeat.
     - TAIL_LAMP: the plain lens; the glow is the renderer's. Faces with u >= 2 are the high lamp: lit by
       BRAKE only.
+    - PALETTE: the stripes of `PALETTE`, each a colour of its own.
     - all others: the albedo itself. Alpha: gloss, 0 dull to 1 a mirror.
 
     Returns:
@@ -324,6 +345,18 @@ def _hill(rng: np.random.Generator) -> Floats:
     return _layer(woods * (1 - share) + fields * share, 0.0)
 
 
+def _fabric(rng: np.random.Generator) -> Floats:
+    """Paint cloth with folds."""
+    shade = 0.86 + 0.10 * _fbm(rng, 4, 3, stretch=2)
+    return _layer(np.repeat(shade[..., None], 3, axis=-1), 0.0)
+
+
+def _palette(_rng: np.random.Generator) -> Floats:
+    """Paint the palette's stripes."""
+    stripes = np.array(list(PALETTE.values()))[np.arange(SIZE) * len(PALETTE) // SIZE]
+    return _layer(np.broadcast_to(stripes, (SIZE, SIZE, 3)), 0.0)
+
+
 _PAINTERS = {
     Surface.PAINT: _paint,
     Surface.GLASS: _glass,
@@ -345,4 +378,6 @@ _PAINTERS = {
     Surface.GRASS: _grass,
     Surface.ASPHALT: _asphalt,
     Surface.HILL: _hill,
+    Surface.FABRIC: _fabric,
+    Surface.PALETTE: _palette,
 }

@@ -161,6 +161,7 @@ class Traffic:
             sizes=np.array([a.draw.size for a in actors], float).reshape(count, 3),
             colours=np.array([a.draw.colour for a in actors], np.float32).reshape(count, 3),
             lamps=np.array([self._lamps(a) for a in actors], np.uint8),
+            leans=np.zeros((len(actors), 2)),
         )
         return Bodies.concatenate(driving, parked)
 

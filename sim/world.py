@@ -48,6 +48,7 @@ class Role(IntEnum):
     ONCOMING = 2
     CROSSING = 3
     PARKED = 4
+    WRONG_WAY = 5
 
 
 class Lamps(IntFlag):
@@ -74,6 +75,8 @@ class Bodies:
         sizes: (N, 3) float64, metres: length (along the heading), width, height.
         colours: (N, 3) float32 in [0, 1]: sRGB paint; models decide where it shows.
         lamps: (N,) uint8, `Lamps` that are on.
+        leans: (N, 2) float64, metres east and north by which a metre of height stands aside: a rider in a
+            bend, a tree in the wind.
     """
 
     ids: NDArray[np.uint32]
@@ -86,6 +89,7 @@ class Bodies:
     sizes: NDArray[np.float64]
     colours: NDArray[np.float32]
     lamps: NDArray[np.uint8]
+    leans: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -113,6 +117,7 @@ class Bodies:
             sizes=np.zeros((0, 3)),
             colours=np.zeros((0, 3), np.float32),
             lamps=np.zeros(0, np.uint8),
+            leans=np.zeros((0, 2)),
         )
 
 
@@ -138,20 +143,38 @@ class Ego:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Lighting:
+    """The light at one tick, as factors on the scene's `sim.models.Light`, red, green and blue.
+
+    Attributes:
+        sun: Of what comes straight from the sun, and casts shadows.
+        sky: Of what comes from everywhere else.
+    """
+
+    sun: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    sky: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class WorldState:
-    """All that moves, at one tick; the scenery stands in the scene.
+    """All that changes, at one tick; the scenery stands in the scene.
 
     Attributes:
         tick: Integer time, from 0.
         rate: Ticks a second.
         vehicles: Every vehicle but the ego, parked ones too.
         ego: The camera car, or None where the camera is on none.
+        lighting: How the light differs from the scene's.
+        sway: (S, 2) how the scene's S pieces of scenery lean, as `Bodies.leans`, or None where the air is
+            still.
     """
 
     tick: int
     rate: int
     vehicles: Bodies
     ego: Ego | None
+    lighting: Lighting = Lighting()
+    sway: NDArray[np.float64] | None = None
 
     @property
     def time(self) -> float:

@@ -114,7 +114,7 @@ def _maps(
         return [], ""
     from tracker.in_car.likelihood import MotionModel, MotionPriors  # compiles kernels
 
-    camera = (scenario.get("in_car") or {}).get("camera") or {}
+    camera = (scenario.get("params") or {}).get("camera") or {}
     focal = recording.focal or camera.get("focal")
     focal_said = "" if focal else " (assumed)"
     focal = focal or DEFAULT_FOCAL * recording.width / 640

@@ -35,7 +35,9 @@ class Recorder:
     that is broken off before leaves nothing behind.
     """
 
-    def __init__(self, directory: Path, *, width: int, height: int, rate: float, title: str) -> None:
+    def __init__(
+        self, directory: Path, *, width: int, height: int, rate: float, title: str, scene: str = "in-car"
+    ) -> None:
         """Get ready.
 
         Args:
@@ -44,7 +46,9 @@ class Recorder:
             height: Of the frames, px.
             rate: Frames a second.
             title: Of the report.
+            scene: Which scene's truth is drawn.
         """
+        self.scene = scene
         self.directory = directory
         self.width = width
         self.height = height
@@ -104,7 +108,7 @@ class Recorder:
             image,
             tracks=tracks,
             traces=diagnostics.traces,
-            truth_boxes=None if truth is None else scored_boxes(truth, self.width, self.height),
+            truth_boxes=None if truth is None else scored_boxes(truth, self.width, self.height, self.scene),
             caption=f"{time:.2f} s",
         )
         if filmed:

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from scenarios.log import EpisodeLog
+from scenarios.score.frames import box_sequence
 from scenarios.score.identification import judge_traces
 from scenarios.score.params import Boxes, ScoringParams
-from scenarios.score.preprocess import box_sequence, select
+from scenarios.score.preprocess import select, select_riders
 from sim.truth.types import FrameTruth
 
 Floats = NDArray[np.float64]
@@ -36,9 +37,14 @@ class Series:
     classes: dict[int, str]
 
 
-def scored_boxes(truth: FrameTruth, width: int, height: int) -> Floats:
-    """Return the boxes (N, 4) of a frame's scored objects."""
-    selection = select(truth, width=width, height=height, params=ScoringParams())
+def scored_boxes(truth: FrameTruth, width: int, height: int, scene: str) -> Floats:
+    """Return the boxes (N, 4) of a frame's scored objects; of a lane also of riders that have long stood."""
+    params = ScoringParams()
+    selection = (
+        select_riders(truth, np.zeros(len(truth)), width=width, height=height, params=params)
+        if scene == "motorcycle-lane"
+        else select(truth, width=width, height=height, params=params)
+    )
     return np.asarray(selection.boxes[selection.scored], float)
 
 

@@ -26,6 +26,14 @@ MEANINGS = {
     "vehicle_coverage": "same-way vehicles, seen for 2 s or more, that carry a trace labelled car",
     "traces_per_10s": "how much was dared",
     "oncoming_as_car": "oncoming traces labelled car",
+    "foreground_f": "foreground masks against the riders' pixels, shadows apart",
+    "correct": "riders that one id follows all the way",
+    "total": "riders scored for 1 s or more",
+    "present": "riders who come the wrong way",
+    "flagged": "of them, flagged",
+    "false": "tracks flagged that are on none of them",
+    "absorbed_s": "from a rider's standstill until it has left the mask",
+    "recovery_s": "from a sudden change of light until the mask is calm again",
     "moving": "traces during which the camera car went 10 m or more",
 }
 """What each score says, in a line."""
@@ -45,8 +53,9 @@ TILE_COUNT = 6
 """The page begins with the first so many of these scores that a tracker can have."""
 
 BOX_SCORES = ("hota", "deta", "assa", "mota", "idf1", "id_switches", "precision", "recall")
+LANE_SCORES = ("foreground_f", "correct", "total", "present", "flagged", "false", "absorbed_s", "recovery_s")
 _TRACES = ("car_recall", "background_recall", "accuracy", "balanced_accuracy", "vehicle_coverage")
-FRACTIONS = frozenset(BOX_SCORES + _TRACES) - {"id_switches"}
+FRACTIONS = frozenset((*BOX_SCORES, *_TRACES, "foreground_f")) - {"id_switches"}
 """The scores that a bar is drawn for."""
 
 DASH = "–"
@@ -135,6 +144,8 @@ def score_row(name: str, value: object, *, has_boxes: bool, has_traces: bool) ->
 def _why_null(name: str, *, has_boxes: bool, has_traces: bool) -> str:
     if name in BOX_SCORES:
         return "nothing to score" if has_boxes else "this tracker gives no boxes"
+    if name in LANE_SCORES:
+        return "nothing to score, or this tracker does not show what it takes"
     if not has_traces:
         return "this tracker shows no traces"
     if name == "median_seconds_to_identify":

@@ -1,4 +1,4 @@
-"""What was there to be got wrong (scoring.md 17, the in-car part)."""
+"""What was there to be got wrong (scoring.md 17)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from scenarios.log import EpisodeLog
+from scenarios.score.frames import scored_frames
 from scenarios.score.identification import CLASSES, JudgedTrace
 from scenarios.score.params import Boxes, ScoringParams
-from scenarios.score.preprocess import select
 from sim.truth.events import occlusion_events
 from tracker.boxes import intersection
 
@@ -19,7 +19,7 @@ from tracker.boxes import intersection
 def difficulty(
     log: EpisodeLog, traces: Iterable[JudgedTrace], *, boxes: Boxes = "amodal", params: ScoringParams
 ) -> dict[str, Any]:
-    """Count what makes an in-car episode hard.
+    """Count what makes an episode hard.
 
     Args:
         log: The episode.
@@ -28,28 +28,31 @@ def difficulty(
         params: Thresholds.
 
     Returns:
-        ``scored_objects`` and ``scored_boxes`` (those objects' in all frames); ``traces`` by their true
-        class, null if the tracker shows none; ``overlapping_pairs`` of scored objects whose boxes meet in
-        some frame; and ``events`` by kind: how often an object was hidden that had been scored within the
-        second before, how often it was seen again, and the median of the seconds it then had been hidden.
+        ``scored_objects`` and ``scored_boxes`` (those objects' in all frames); in-car ``traces`` by their
+        true class, null if the tracker shows none, on the lane ``riders_in_view``; ``overlapping_pairs`` of
+        scored objects whose boxes meet in some frame; and ``events`` by kind: how often an object was hidden
+        that had been scored within the second before, how often it was seen again, and the median of the
+        seconds it then had been hidden.
     """
     scored_at: dict[int, list[int]] = defaultdict(list)
     pairs: set[tuple[int, int]] = set()
-    for truth in log.truth:
-        selection = select(truth, width=log.width, height=log.height, boxes=boxes, params=params)
-        ids, found = truth.ids[selection.scored], selection.boxes[selection.scored]
+    in_view = []
+    for frame in scored_frames(log, boxes=boxes, params=params):
+        selection = frame.selection
+        ids, found = frame.truth.ids[selection.scored], selection.boxes[selection.scored]
+        in_view.append(len(ids))
         for vehicle in ids.tolist():
-            scored_at[vehicle].append(truth.tick)
+            scored_at[vehicle].append(frame.truth.tick)
         for a, b in np.argwhere(np.triu(intersection(found, found) > 0, k=1)):
             pairs.add((min(int(ids[a]), int(ids[b])), max(int(ids[a]), int(ids[b]))))
+    counts = {"scored_objects": len(scored_at), "scored_boxes": sum(in_view)}
+    hidden = {"overlapping_pairs": len(pairs), "events": _events(log, scored_at)}
+    if log.scene == "motorcycle-lane":
+        view = {"mean": float(np.mean(in_view)), "most": float(max(in_view))} if in_view else None
+        return counts | {"riders_in_view": view} | hidden
     classes = [trace.truth for trace in traces]
-    return {
-        "scored_objects": len(scored_at),
-        "scored_boxes": sum(map(len, scored_at.values())),
-        "traces": {name: classes.count(name) if log.traces is not None else None for name in CLASSES},
-        "overlapping_pairs": len(pairs),
-        "events": _events(log, scored_at),
-    }
+    by_class = {name: classes.count(name) if log.traces is not None else None for name in CLASSES}
+    return counts | {"traces": by_class} | hidden
 
 
 def _events(log: EpisodeLog, scored_at: Mapping[int, Sequence[int]]) -> dict[str, Any]:

@@ -24,6 +24,17 @@ class ScoringParams:
         majority: Least share of a trace's support points that lie on what it belongs to.
         min_vehicle_seconds: Vehicles scored for less do not count in the coverage.
         min_ego_metres: Under ``moving`` stand only traces during which the camera car went as far.
+        training_frames: First frames of a lane, which are not scored.
+        min_rider_height: `min_height` of riders, px.
+        standing_seconds: A rider that has stood still for so long is ignored until it moves.
+        detection_iou: Least IoU of a detection, or of a track, with a rider that it is on.
+        min_rider_seconds: Riders scored for less do not count in the full tracks.
+        full_share: Least share of a rider's scored frames in which a full track is on it.
+        full_gap: Most frames in a row that it may miss, and that its id may be on other riders.
+        absorbed_share: A rider that stands is absorbed once no more of it is in the mask.
+        flash_change: Least change of the light from one frame to the next, as a part of it, that is sudden.
+        recovered_share: A mask has recovered once no more of the background is in it ...
+        recovered_seconds: ... for so long.
     """
 
     max_distance: float = 60.0
@@ -36,3 +47,14 @@ class ScoringParams:
     majority: float = 0.6
     min_vehicle_seconds: float = 2.0
     min_ego_metres: float = 10.0
+    training_frames: int = 30
+    min_rider_height: float = 14.0
+    standing_seconds: float = 3.0
+    detection_iou: float = 0.4
+    min_rider_seconds: float = 1.0
+    full_share: float = 0.95
+    full_gap: int = 3
+    absorbed_share: float = 0.2
+    flash_change: float = 0.1
+    recovered_share: float = 0.05
+    recovered_seconds: float = 0.5

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from scenarios.log import EpisodeLog
 from scenarios.score.params import Boxes, ScoringParams
-from scenarios.score.sequence import Sequence
 from sim.truth.types import FrameTruth
 from sim.world import Role
 from tracker.boxes import box_area, intersection, iou
@@ -56,12 +54,51 @@ def select(
     return Selection(boxes=clipped, scored=scored, ignored=present & ~scored & (truth.roles != Role.PARKED))
 
 
+def select_riders(
+    truth: FrameTruth,
+    standing: Floats,
+    *,
+    width: int,
+    height: int,
+    boxes: Boxes = "amodal",
+    params: ScoringParams,
+) -> Selection:
+    """Decide which riders of a frame of the lane are scored, and by which boxes.
+
+    Args:
+        truth: Of the frame.
+        standing: (N,) seconds that each rider has stood; after a while it is ignored (scoring.md 15).
+        width: Of the frame, px.
+        height: Of the frame, px.
+        boxes: Which boxes are scored.
+        params: Thresholds.
+    """
+    chosen = truth.box_amodal if boxes == "amodal" else truth.box_visible
+    clipped = clip(chosen, width, height)
+    present = box_area(clipped) > 0
+    clipped = np.where(present[:, None], clipped, np.nan)
+    scored = (
+        present
+        & (truth.visible >= params.min_visible)
+        & (clipped[:, 3] - clipped[:, 1] >= params.min_rider_height)
+        & (standing < params.standing_seconds)
+    )
+    return Selection(boxes=clipped, scored=scored, ignored=present & ~scored)
+
+
 def clip(boxes: Floats, width: int, height: int) -> Floats:
     """Cut boxes (N, 4) off at the frame's border; not a number stays what it is."""
     return np.clip(boxes, 0.0, np.array([width, height, width, height], float))
 
 
-def kept_tracks(boxes: Floats, scored: Floats, ignored: Floats, params: ScoringParams) -> Mask:
+def kept_tracks(
+    boxes: Floats,
+    scored: Floats,
+    ignored: Floats,
+    params: ScoringParams,
+    *,
+    match: float | None = None,
+) -> Mask:
     """Tell which of a frame's P track boxes are scored: all but the unmatched ones on ignored vehicles.
 
     Args:
@@ -69,6 +106,7 @@ def kept_tracks(boxes: Floats, scored: Floats, ignored: Floats, params: ScoringP
         scored: (G, 4) of scored vehicles.
         ignored: (I, 4) of ignored vehicles.
         params: Thresholds.
+        match: Least IoU of a match, if another than `ScoringParams.match_iou`.
 
     Returns:
         (P,) bool.
@@ -77,7 +115,7 @@ def kept_tracks(boxes: Floats, scored: Floats, ignored: Floats, params: ScoringP
     if not len(ignored) or not len(boxes):
         return keep
     overlap = iou(scored, boxes)
-    worth = np.where(overlap >= params.match_iou, overlap, 0.0)
+    worth = np.where(overlap >= (params.match_iou if match is None else match), overlap, 0.0)
     rows, columns = linear_sum_assignment(worth, maximize=True)
     matched = np.zeros(len(boxes), bool)
     matched[columns[worth[rows, columns] > 0]] = True
@@ -106,17 +144,3 @@ def confirmed(tracks: Tracks, width: int, height: int) -> tuple[NDArray[np.int64
     """Give ids (P,) and boxes (P, 4), cut off at the frame's border, of the confirmed tracks."""
     chosen = tracks.status == Status.CONFIRMED
     return tracks.ids[chosen], clip(tracks.boxes[chosen], width, height)
-
-
-def box_sequence(log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams) -> Sequence:
-    """Turn an episode into what CLEAR, identity and HOTA are computed from."""
-    truth_ids, track_ids, similarities = [], [], []
-    for truth, tracks in zip(log.truth, log.tracks, strict=True):
-        selection = select(truth, width=log.width, height=log.height, boxes=boxes, params=params)
-        scored = selection.boxes[selection.scored]
-        ids, found = confirmed(tracks, log.width, log.height)
-        keep = kept_tracks(found, scored, selection.boxes[selection.ignored], params)
-        truth_ids.append(truth.ids[selection.scored])
-        track_ids.append(ids[keep])
-        similarities.append(iou(scored, found[keep]))
-    return Sequence.of(truth_ids, track_ids, similarities)

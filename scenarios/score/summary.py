@@ -7,11 +7,12 @@ from typing import Any
 from scenarios.log import EpisodeLog
 from scenarios.score.clear import clear
 from scenarios.score.difficulty import difficulty
+from scenarios.score.frames import box_sequence
 from scenarios.score.hota import hota
 from scenarios.score.identification import identification, judge_traces
 from scenarios.score.identity import identity
+from scenarios.score.lane import lane_scores
 from scenarios.score.params import Boxes, ScoringParams
-from scenarios.score.preprocess import box_sequence
 
 DEFAULTS = ScoringParams()
 
@@ -19,7 +20,7 @@ DEFAULTS = ScoringParams()
 def score(
     log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams = DEFAULTS
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Score one tracker on one in-car episode.
+    """Score one tracker on one episode, as its scene wants it.
 
     Args:
         log: The episode.
@@ -31,23 +32,25 @@ def score(
         and None where what a score is computed from is missing.
     """
     traces = judge_traces(log, params)
-    scores = {
-        **box_scores(log, boxes=boxes, params=params),
-        "identification": identification(log, traces, boxes=boxes, params=params),
-    }
+    special = (
+        lane_scores(log, boxes=boxes, params=params)
+        if log.scene == "motorcycle-lane"
+        else {"identification": identification(log, traces, boxes=boxes, params=params)}
+    )
+    scores = box_scores(log, boxes=boxes, params=params) | special
     return scores, difficulty(log, traces, boxes=boxes, params=params)
 
 
 def box_scores(
     log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams = DEFAULTS
-) -> dict[str, float | int | None]:
+) -> dict[str, Any]:
     """Compute HOTA, CLEAR and identity.
 
     All are null for a tracker without boxes; all but the precision where there is nothing to be tracked, and
     the precision where nothing was claimed.
     """
     names = ("hota", "deta", "assa", "mota", "idf1", "id_switches", "precision", "recall")
-    scores: dict[str, float | int | None] = dict.fromkeys(names)
+    scores: dict[str, Any] = dict.fromkeys(names)
     if not log.has_boxes:
         return scores
     sequence = box_sequence(log, boxes=boxes, params=params)

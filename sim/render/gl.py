@@ -22,7 +22,7 @@ from sim.render.sky import HIGHEST, panorama, screen_grid
 from sim.render.types import Picture, Silhouettes, Stage
 from sim.render.view import look_matrix, view_matrices
 from sim.textures import texture_array
-from sim.world import SKY_ID, Bodies, WorldState
+from sim.world import SKY_ID, Lighting, WorldState
 
 _ROOM = 8192  # instances and draws in a frame
 
@@ -119,7 +119,9 @@ class GlRenderer:
 
     def _draw(self, ctx: Any, state: WorldState, camera: Camera, pose: Pose) -> None:
         """Ask OpenGL to draw the picture."""
-        bodies = Bodies.concatenate(self._stage.scenery, state.vehicles)
+        if state.lighting != self._lighting:
+            self._shine(state.lighting)
+        bodies = self._stage.bodies(state)
         selection = in_bands(bodies, self._library.select(bodies, camera, pose), pose)
         commands = self._library.commands(selection.meshes)
         casters = self._library.select(bodies, camera, pose, widen=_SHADOW_WIDEN, coarsest=True)
@@ -144,6 +146,20 @@ class GlRenderer:
         self._contact_pass(ctx, view, contacts(state.vehicles, pose))
         self._sky_pass(ctx, camera, pose)
         self._halo_pass(ctx, view, halos(burning, camera, night=self._stage.light.night)[:_ROOM])
+
+    def _shine(self, lighting: Lighting) -> None:
+        """Set the light of one tick."""
+        self._lighting, light = lighting, self._stage.light
+        sky = np.array(lighting.sky)
+        for shader in (self._body, self._paved, self._land, self._sky):
+            set_uniforms(
+                shader,
+                # What a white surface that faces the sun sends back.
+                u_sun_colour=tuple(light.sun_colour * lighting.sun / np.pi),
+                u_zenith=tuple(light.zenith * sky),
+                u_horizon=tuple(light.horizon * sky),
+                u_shown=tuple(np.sqrt(sky)),
+            )
 
     def _shadow_pass(self, ctx: Any, view: dict[str, Any], draws: int, pose: Pose) -> None:
         self._mask.use()
@@ -304,12 +320,13 @@ class GlRenderer:
                     (self._vertices, "3f 3f 2f 1f", "in_position", "in_normal", "in_uv", "in_surface"),
                     (
                         self._instances,
-                        "3f 2f 3f 4f1 1u/i",
+                        "3f 2f 3f 4f1 1u 2f/i",
                         "i_position",
                         "i_turn",
                         "i_scale",
                         "i_colour",
                         "i_id",
+                        "i_lean",
                     ),
                 ],
                 self._faces,
@@ -333,18 +350,10 @@ class GlRenderer:
         self._sky = keep(program(ctx, "sky", "sky"))
         self._sky_grid = keep(ctx.buffer(screen_grid().tobytes()))
         self._sky_array = keep(ctx.vertex_array(self._sky, [(self._sky_grid, "2f", "in_corner")]))
-        lit = {
-            "u_sun": tuple(light.sun),
-            "u_sun_colour": tuple(light.sun_colour / np.pi),  # what a white surface that faces it sends back
-            "u_zenith": tuple(light.zenith),
-            "u_horizon": tuple(light.horizon),
-            "u_haze": light.haze,
-        }
+        units = {"u_textures": 0, "u_grain": 1, "u_road": 2, "u_shadow": 3, "u_panorama": 4, "u_marks": 5}
         for shader in (self._body, self._paved, self._land, self._sky):
-            set_uniforms(
-                shader, **lit, u_textures=0, u_grain=1, u_road=2, u_shadow=3, u_panorama=4, u_marks=5
-            )
-            set_uniforms(shader, u_pool=6, u_mirror=7)
+            set_uniforms(shader, **units, u_pool=6, u_mirror=7, u_sun=tuple(light.sun), u_haze=light.haze)
+        self._shine(Lighting())
         set_uniforms(self._body, u_material=material_table())
         for shader in (self._paved, self._land):
             set_uniforms(shader, u_paved=stage.ground.paved, u_margin=MARGIN, u_wet=light.wet)
@@ -380,8 +389,8 @@ class GlRenderer:
             ctx.vertex_array(
                 shader,
                 [
-                    (self._vertices, "3f 24x", "in_position"),
-                    (instances, "3f 2f 3f 8x/i", "i_position", "i_turn", "i_scale"),
+                    (self._vertices, "3f 20x 1f", "in_position", "in_surface"),
+                    (instances, "3f 2f 3f 8x 2f/i", "i_position", "i_turn", "i_scale", "i_lean"),
                     *more,
                 ],
                 self._faces,

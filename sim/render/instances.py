@@ -19,6 +19,7 @@ INSTANCE = np.dtype(
         ("scale", "<f4", 3),
         ("colour", "u1", 4),  # sRGB, and the lamps
         ("id", "<u4"),
+        ("lean", "<f4", 2),  # metres aside for each metre of height
     ]
 )
 """One instance, as the shaders read it. Positions are relative: far from the origin float32 is coarse."""
@@ -129,6 +130,7 @@ class Library:
             return Selection(rows=np.zeros(0, np.intp), meshes=np.zeros(0, np.int32))
         scale = bodies.sizes / self.sizes[bodies.models]
         reach = self._reach[bodies.models] * scale.max(axis=1)
+        reach += bodies.sizes[:, 2] * np.hypot(*bodies.leans.T)
         centre = bodies.positions - pose.position
         centre[:, 2] += 0.5 * bodies.sizes[:, 2]
         right, down, ahead = pose.rotation @ centre.T
@@ -166,6 +168,7 @@ class Library:
         out["colour"][:, :3] = np.clip(chosen.colours * 255 + 0.5, 0, 255)
         out["colour"][:, 3] = chosen.lamps
         out["id"] = chosen.ids
+        out["lean"] = chosen.leans
         return out
 
     def corners(self, bodies: Bodies, selection: Selection) -> NDArray[np.float64]:
@@ -176,7 +179,11 @@ class Library:
         local = np.stack([bounds[:, picks[:, axis], axis] for axis in range(3)], axis=-1)
         cos, sin = np.cos(chosen.yaws)[:, None], np.sin(chosen.yaws)[:, None]
         x, y = cos * local[..., 0] - sin * local[..., 1], sin * local[..., 0] + cos * local[..., 1]
-        return np.stack([x, y, local[..., 2]], axis=-1) + chosen.positions[:, None, :]
+        aside = chosen.leans[:, None, :] * local[..., 2:]
+        return (
+            np.stack([x + aside[..., 0], y + aside[..., 1], local[..., 2]], axis=-1)
+            + chosen.positions[:, None]
+        )
 
     def commands(self, meshes: NDArray[np.int32]) -> NDArray[np.void]:
         """Return one `COMMAND` for each run of equal meshes in (M,) ``meshes``."""

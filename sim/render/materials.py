@@ -20,6 +20,8 @@ _GLOSS = {
     Surface.FOLIAGE: (1.0, 0.0, 0.0, 0.0),
     Surface.FACADE: (1.0, 0.0, 0.25, 0.0),
     Surface.HILL: (1.0, 0.0, 0.0, 0.0),
+    Surface.FABRIC: (1.0, 0.0, 0.0, 0.0),
+    Surface.PALETTE: (0.0, 0.025, 0.0, 0.0),
     Surface.SIGN: (2.0, 0.01, 0.0, 25.0),
 }
 

@@ -17,7 +17,7 @@ from sim.render.ground import MARGIN, PERIOD, cut, road_texture
 from sim.render.instances import Library
 from sim.render.types import Picture, Stage
 from sim.textures import texture_array
-from sim.world import GROUND_ID, Bodies, WorldState
+from sim.world import GROUND_ID, WorldState
 
 _ORIGIN_GRID = 256.0
 _ROUGHNESS = {
@@ -27,7 +27,14 @@ _ROUGHNESS = {
     Surface.HEAD_LAMP: 0.2,
     Surface.TAIL_LAMP: 0.3,
 }
-_PAINTED = (Surface.PAINT, Surface.CARGO, Surface.FOLIAGE, Surface.FACADE, Surface.HILL)
+_PAINTED = (
+    Surface.PAINT,
+    Surface.CARGO,
+    Surface.FABRIC,
+    Surface.FOLIAGE,
+    Surface.FACADE,
+    Surface.HILL,
+)
 _EXPOSURE = 3.0
 _LAND = (0.16, 0.17, 0.09)
 
@@ -161,17 +168,19 @@ class PbrRenderer:
             ),
             pose=eye,
         )
-        bodies = Bodies.concatenate(self._stage.scenery, state.vehicles)
+        bodies = self._stage.bodies(state)
         selection = self._library.select(bodies, camera, pose)
         chosen = bodies.take(selection.rows)
         scales = chosen.sizes / self._library.sizes[chosen.models]
-        moving = len(self._stage.scenery)
+        moving = len(self._stage.scenery) if state.sway is None else 0
         wanted: dict[Key, Any] = {}
         for k, (row, mesh) in enumerate(zip(selection.rows.tolist(), selection.meshes.tolist(), strict=True)):
             key = (int(chosen.ids[k]), mesh)
             node = self._nodes.pop(key, None)
             if node is None or row >= moving:
-                place = placed(chosen.positions[k] - origin, float(chosen.yaws[k]), scales[k])
+                place = placed(
+                    chosen.positions[k] - origin, float(chosen.yaws[k]), scales[k], chosen.leans[k]
+                )
                 if node is None:
                     node = self._scene.add(self._mesh(mesh, chosen.colours[k]), pose=place)
                 else:
@@ -185,7 +194,7 @@ class PbrRenderer:
             self._scene.remove_node(self._stretch_nodes.pop(number))
         for number in stretches:
             if number not in self._stretch_nodes:
-                place = placed(self._ground.origins[number] - origin, 0.0, np.ones(3))
+                place = placed(self._ground.origins[number] - origin, 0.0, np.ones(3), np.zeros(2))
                 self._stretch_nodes[number] = self._scene.add(self._stretch(number), pose=place)
         return [
             *((node, key[0]) for key, node in self._nodes.items()),
@@ -284,11 +293,13 @@ def code_colour(code: int) -> tuple[int, int, int]:
     return code >> 16 & 255, code >> 8 & 255, code & 255
 
 
-def placed(position: NDArray[np.float64], yaw: float, scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (4, 4): scaled, turned about z, moved."""
+def placed(
+    position: NDArray[np.float64], yaw: float, scale: NDArray[np.float64], lean: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return (4, 4): scaled, turned about z, leaning, moved."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     out = np.eye(4)
-    out[:3, :3] = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]) * scale
+    out[:3, :3] = np.array([[cos, -sin, lean[0]], [sin, cos, lean[1]], [0, 0, 1]]) * scale
     out[:3, 3] = position
     return out
 

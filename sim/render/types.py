@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.models import Ground, Light, Model
-from sim.world import Bodies
+from sim.world import Bodies, WorldState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,15 +17,20 @@ class Stage:
 
     Attributes:
         models: What bodies' ``models`` index.
-        scenery: The bodies that never move.
+        scenery: The bodies that never leave their places.
         ground: The ground (id 1).
-        light: The light at the start.
+        light: The light, before a state's `sim.world.Lighting`.
     """
 
     models: tuple[Model, ...]
     scenery: Bodies
     ground: Ground
     light: Light
+
+    def bodies(self, state: WorldState) -> Bodies:
+        """Return all that stands or drives at one tick: the scenery as it sways, then the vehicles."""
+        scenery = self.scenery if state.sway is None else replace(self.scenery, leans=state.sway)
+        return Bodies.concatenate(scenery, state.vehicles)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

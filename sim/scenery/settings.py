@@ -55,6 +55,16 @@ SETTINGS = {
             "building": ((0, 0.0), (8, 0.0), (9, 2.5), (50, 4.0)),
         },
     ),
+    "avenue": Setting(
+        per_km=260.0,
+        weights={
+            "tree": ((0, 0.0), (1.5, 1.0), (3, 6.0), (14, 6.0), (50, 3.0)),
+            "bush": ((0, 0.3), (1, 2.0), (6, 2.0), (12, 1.0), (50, 0.5)),
+            "sign": ((0, 0.4), (2, 0.4), (4, 0.1), (5, 0.0), (50, 0.0)),
+            "pole": ((0, 0.3), (2, 0.3), (5, 0.1), (50, 0.0)),
+            "building": ((0, 0.0), (14, 0.0), (18, 0.3), (50, 0.8)),
+        },
+    ),
 }
 
 SPECIES = ("tree", "bush", "sign", "pole", "building")
@@ -81,6 +91,13 @@ MODELS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "sign": ("sign-direction", "sign-speed", "sign-warning", "sign-diamond"),
         "pole": ("pole-b", "delineator"),
         "building": ("house-a", "house-b", "house-c", "barn"),
+    },
+    "avenue": {
+        "tree": ("broadleaf-c", "broadleaf-a", "broadleaf-e", "broadleaf-d", "conifer-a"),
+        "bush": ("bush-a", "bush-b", "bush-c"),
+        "sign": ("sign-speed", "sign-warning", "sign-diamond"),
+        "pole": ("pole-b", "delineator"),
+        "building": ("shops-a", "flats-a", "house-a", "shops-b", "house-c", "block-b"),
     },
     "urban": {
         "tree": ("broadleaf-a", "broadleaf-c", "broadleaf-e", "broadleaf-d"),
@@ -161,5 +178,6 @@ class Lines:
 LINES = {
     "motorway": Lines(shares=(0.55, 0.14, 0.25), wall="noise-wall", wall_away=4.0, fence_away=11.0),
     "rural": Lines(shares=(0.12, 0.0, 0.25), wall="wall", wall_away=3.2, fence_away=6.0),
+    "avenue": Lines(shares=(0.25, 0.15, 0.10), wall="wall", wall_away=3.2, fence_away=5.2),
     "urban": Lines(shares=(0.0, 0.10, 0.20), wall="wall", wall_away=3.2, fence_away=5.2),
 }

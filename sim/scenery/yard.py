@@ -97,6 +97,7 @@ class Yard:
             sizes=np.array([row[4] for row in self._rows]),
             colours=np.array([row[5] for row in self._rows], np.float32),
             lamps=np.full(count, Lamps.OFF, np.uint8),
+            leans=np.zeros((count, 2)),
         )
 
     def clear_of_road(self, s: float, d: float, reach: float) -> bool:

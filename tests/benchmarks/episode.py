@@ -54,11 +54,11 @@ def memory_over(minutes: float, name: str = "in-car-day") -> list[float]:
     """
     scenario = spec.load(name)
     frames = round(60 * minutes * scenario.rate)
-    scene = InCarScene(scenario.in_car, seed=0, rate=scenario.rate, seconds=60 * minutes)
+    scene = InCarScene(scenario.params, seed=0, rate=scenario.rate, seconds=60 * minutes)
     tracker = registry.make(TRACKER)
     tracker.start(tracker_info(scene.camera, scenario.rate))
     resident = []
-    with Simulation(scene, scenario.in_car.sensor, seed=0) as simulation:
+    with Simulation(scene, scenario.params.sensor, seed=0) as simulation:
         for observation in simulation.run(frames):
             tracker.step(tracker_frame(observation, odometry=False))
             if (observation.tick + 1) % (frames // 20) == 0:

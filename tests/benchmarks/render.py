@@ -55,10 +55,10 @@ def timed_pass(times: list[float], work: Callable[..., Any]) -> Callable[..., An
 def main() -> list[Line]:
     """Print medians over the frames, and return the ratios."""
     spec = load(SCENARIO)
-    scene = InCarScene(spec.in_car, seed=0, rate=spec.rate, seconds=10.0)
+    scene = InCarScene(spec.params, seed=0, rate=spec.rate, seconds=10.0)
     times: dict[str, list[float]] = defaultdict(list)
     with GlRenderer(scene.stage, scene.camera) as fast, PbrRenderer(scene.stage, scene.camera) as slow:
-        sensor = Sensor(spec.in_car.sensor, scene.stage.light, scene.camera, spec.rate, 0)
+        sensor = Sensor(spec.params.sensor, scene.stage.light, scene.camera, spec.rate, 0)
         views = []
         for tick in range(FRAMES * EVERY):
             state = scene.step()

@@ -29,8 +29,8 @@ WARM = 30
 def record(scenario_name: str) -> tuple[Info, list[Frame]]:
     """Render the beginning of a scenario's drive of seed 0; return what the tracker is given."""
     scenario = spec.load(scenario_name)
-    scene = InCarScene(scenario.in_car, seed=0, rate=scenario.rate, seconds=scenario.seconds)
-    with Simulation(scene, scenario.in_car.sensor, seed=0) as simulation:
+    scene = InCarScene(scenario.params, seed=0, rate=scenario.rate, seconds=scenario.seconds)
+    with Simulation(scene, scenario.params.sensor, seed=0) as simulation:
         frames = [tracker_frame(seen, odometry=False) for seen in simulation.run(WARM + FRAMES)]
     return tracker_info(scene.camera, scenario.rate), frames
 

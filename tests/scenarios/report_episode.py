@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scenarios.log import EpisodeLog, TraceLog
 from scenarios.report.recorder import Recorder
+from scenarios.shown import ShownLog
 from sim.truth.types import FrameTruth
 from sim.world import FIRST_VEHICLE_ID, Kind, Role
 from tracker.types import Diagnostics, Label, Status, Traces, Tracks
@@ -94,6 +95,9 @@ def episode_log(found: list[Step]) -> EpisodeLog:
     ids = column(lambda t: t.ids)
     height, width = found[0][0].shape[:2]
     return EpisodeLog(
+        scene="in-car",
+        shown=ShownLog(detections=None, flags=None, mask_px=None, object_px=None),
+        light=np.ones(len(found)),
         scenario="made-up",
         spec_id="0123abcd",
         seed=7,
@@ -160,7 +164,7 @@ def scenario() -> dict[str, Any]:
         "description": "Nothing but a car that weaves.",
         "seconds": FRAMES / RATE,
         "rate": RATE,
-        "in_car": {"camera": {"width": WIDTH, "focal": FOCAL}, "light": {"time": "day", "haze": 0.0012}},
+        "params": {"camera": {"width": WIDTH, "focal": FOCAL}, "light": {"time": "day", "haze": 0.0012}},
     }
 
 

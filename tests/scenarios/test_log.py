@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from scenarios.log import EpisodeLog, TraceLog, load, save
+from scenarios.shown import ShownLog
 from sim.truth.types import FrameTruth
 from tracker.types import Tracks
 
@@ -40,8 +41,22 @@ def tracks(rng: np.random.Generator, n: int, *, full: bool) -> Tracks:
     )
 
 
-def make_log(frames: int = 5, *, with_traces: bool = True, with_depths: bool = False) -> EpisodeLog:
+def shown_of(rng: np.random.Generator, frames: int) -> ShownLog:
+    rows = [0, 3, 1, 0, 2][:frames]
+    return ShownLog(
+        detections=tuple(rng.random((n, 4)) for n in rows),
+        flags=tuple(np.arange(n, dtype=np.int64) for n in rows),
+        mask_px=rng.integers(-1, 9, frames),
+        object_px=tuple(rng.integers(0, 9, n) for n in rows),
+    )
+
+
+def make_log(
+    frames: int = 5, *, with_traces: bool = True, with_depths: bool = False, with_shown: bool = False
+) -> EpisodeLog:
     rng = np.random.default_rng(3)
+    nothing = ShownLog(detections=None, flags=None, mask_px=None, object_px=None)
+    shown = shown_of(rng, frames) if with_shown else nothing
     traces = TraceLog(
         ticks=np.arange(4),
         ids=np.array([1, 1, 2, 2]),
@@ -58,6 +73,9 @@ def make_log(frames: int = 5, *, with_traces: bool = True, with_depths: bool = F
     )
     return EpisodeLog(
         scenario="in-car-day",
+        scene="in-car",
+        shown=shown,
+        light=rng.random(frames),
         spec_id="ab12",
         seed=0,
         tracker="in-car",
@@ -102,6 +120,12 @@ def test_loading_gives_what_was_saved(tmp_path: Path, frames: int, with_traces: 
 
 def test_depths_are_kept(tmp_path: Path) -> None:
     log = make_log(with_depths=True)
+    save(log, tmp_path / "log.npz")
+    assert same(load(tmp_path / "log.npz"), log)
+
+
+def test_what_was_shown_is_kept(tmp_path: Path) -> None:
+    log = make_log(with_shown=True)
     save(log, tmp_path / "log.npz")
     assert same(load(tmp_path / "log.npz"), log)
 

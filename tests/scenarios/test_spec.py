@@ -8,11 +8,23 @@ from scenarios.spec import SpecError
 NAMES = ("in-car-curve", "in-car-day", "in-car-night", "in-car-rain", "in-car-stop-and-go", "in-car-urban")
 
 
-def test_the_library_holds_the_six_scenarios_of_twenty_seconds():
-    assert tuple(spec.library()) == NAMES
+LANES = ("lane-cloudy", "lane-day", "lane-dense", "lane-flash", "lane-parked", "lane-wrong-way")
+
+
+def test_the_library_holds_the_scenarios_of_the_lane():
+    for name in LANES:
+        scenario = spec.load(name)
+        camera = scenario.params.camera
+        assert (scenario.scene, scenario.frames, scenario.rate) == ("motorcycle-lane", 330, 30)
+        assert (camera.width, camera.height) == (360, 240)
+        assert scenario.description
+
+
+def test_the_library_holds_the_six_in_car_scenarios_of_twenty_seconds():
+    assert tuple(spec.library()) == NAMES + LANES
     for name in NAMES:
         scenario = spec.load(name)
-        camera = scenario.in_car.camera
+        camera = scenario.params.camera
         assert (scenario.name, scenario.frames, scenario.rate) == (name, 600, 30)
         assert (camera.width, camera.height) == (640, 480)
         assert scenario.description
@@ -22,20 +34,20 @@ def test_a_file_is_read_and_named_by_its_stem(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('scene = "in-car"\nseconds = 2\n[traffic]\ndensity = 3\n')
     scenario = spec.load(path)
-    assert (scenario.name, scenario.frames, scenario.in_car.traffic.density) == ("mine", 60, 3.0)
+    assert (scenario.name, scenario.frames, scenario.params.traffic.density) == ("mine", 60, 3.0)
 
 
 def test_overrides_are_toml_and_words_need_no_quotes():
     scenario = spec.load(
         "in-car-day", ["sensor.noise=3", "light.time=night", "road.curved=true", 'scenery.setting="urban"']
     )
-    params = scenario.in_car
+    params = scenario.params
     assert (params.sensor.noise, params.light.time, params.road.curved) == (3.0, "night", True)
     assert params.scenery.setting == "urban"
 
 
 def test_the_last_override_wins():
-    assert spec.load("in-car-day", ["sensor.noise=3", "sensor.noise=4"]).in_car.sensor.noise == 4.0
+    assert spec.load("in-car-day", ["sensor.noise=3", "sensor.noise=4"]).params.sensor.noise == 4.0
 
 
 def test_the_digest_follows_what_a_drive_depends_on_and_nothing_else(tmp_path):
@@ -49,8 +61,14 @@ def test_the_digest_follows_what_a_drive_depends_on_and_nothing_else(tmp_path):
 
 def test_the_schema_describes_the_file():
     schema = spec.json_schema()
-    assert {"scene", "seconds", "rate", "road", "sensor"} <= set(schema["properties"])
-    assert schema["additionalProperties"] is False
+    assert {option["$ref"].rpartition("/")[2] for option in schema["oneOf"]} == {
+        "InCarFile",
+        "MotorcycleLaneFile",
+    }
+    for name, table in (("InCarFile", "road"), ("MotorcycleLaneFile", "riders")):
+        file = schema["$defs"][name]
+        assert {"scene", "seconds", "rate", "sensor", table} <= set(file["properties"])
+        assert file["additionalProperties"] is False
     json.dumps(schema)
 
 
@@ -89,6 +107,22 @@ def test_wrong_overrides_are_refused_in_one_line(overrides, parts):
 
 
 @pytest.mark.parametrize(
+    ("overrides", "parts"),
+    [
+        (["riders.rider=3"], ["unknown key 'riders.rider'", "did you mean 'riders'"]),
+        (["noise=3"], ["did you mean 'sensor.noise'"]),
+        (["ego.speed=3"], ["unknown key 'ego'"]),
+        (["light.flash=moon"], ["wanted 'none', 'sun' or 'lamp'"]),
+        (["seconds.x=3"], ["'seconds' is no table"]),
+    ],
+)
+def test_keys_are_those_of_the_own_scene(overrides, parts):
+    with pytest.raises(SpecError) as caught:
+        spec.load("lane-day", overrides)
+    assert all(part in str(caught.value) for part in parts), str(caught.value)
+
+
+@pytest.mark.parametrize(
     ("text", "parts"),
     [
         ('scene = "in-car"\n[sensor]\nnois = 3\n', ["unknown key 'sensor.nois'", "did you mean 'noise'"]),
@@ -96,7 +130,7 @@ def test_wrong_overrides_are_refused_in_one_line(overrides, parts):
         ('scene = "in-car"\n[camera]\nfocal = nan\n', ["camera.focal is nan"]),
         ('scene = "in-car"\n[camera]\nheight = -4\n', ["camera.height is -4"]),
         ("seconds = 3\n", ["'scene' is missing"]),
-        ('scene = "moon"\n', ["scene is 'moon'", "wanted 'in-car'"]),
+        ('scene = "moon"\n', ["scene is 'moon'", "wanted 'in-car' or 'motorcycle-lane'"]),
         ("scene = \n", ["not TOML", "line 1"]),
     ],
 )

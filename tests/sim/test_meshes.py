@@ -7,11 +7,12 @@ import pytest
 
 from sim.meshes import catalogue
 from sim.meshes.builder import MeshBuilder
+from sim.meshes.motorcycles import OUTFITS, rider_models
 from sim.models import Mesh, Model, Surface
 from sim.world import VEHICLE_KINDS, Kind
 
-MODELS = catalogue()
-VEHICLES = [model for model in MODELS if model.kind in VEHICLE_KINDS]
+MODELS = catalogue() + rider_models()
+VEHICLES = [model for model in catalogue() if model.kind in VEHICLE_KINDS]
 MIRRORS = 0.55
 """Metres that mirrors and lamps may stand out of a vehicle's width."""
 
@@ -28,7 +29,8 @@ def face_normals(mesh: Mesh):
 
 def test_names_are_unique_and_the_list_is_cached():
     assert len(set(names(MODELS))) == len(MODELS)
-    assert catalogue() is MODELS
+    assert catalogue() is catalogue()
+    assert rider_models() is rider_models()
 
 
 @pytest.mark.parametrize("model", MODELS, ids=names(MODELS))
@@ -112,7 +114,10 @@ def test_vehicles_have_horizontal_edges_behind(model: Model):
 def test_triangle_budgets(model: Model):
     counts = [len(mesh.faces) for mesh in model.lods]
     assert counts == sorted(counts, reverse=True)
-    if model.kind in VEHICLE_KINDS:
+    if model.kind is Kind.MOTORCYCLE:
+        assert counts[0] <= 900
+        assert counts[1] <= 560
+    elif model.kind in VEHICLE_KINDS:
         assert counts[0] <= 520
         assert counts[1] <= 190
         assert counts[2] <= 110
@@ -168,3 +173,22 @@ def test_builder_turns_faces_outward_and_scales_uv():
     assert ((middle * normal).sum(axis=1) > 0).all()
     np.testing.assert_allclose(mesh.normals[mesh.faces[:, 0]], normal, atol=1e-6)
     assert mesh.uvs[:, 1].max() == pytest.approx(3.0), "v is metres up"
+
+
+def test_riders_wear_many_colours_and_are_cheap():
+    machines = rider_models()
+    worn = {
+        tuple(np.unique(m.lods[0].uvs[m.lods[0].surfaces == Surface.PALETTE, 0]).tolist()) for m in machines
+    }
+    assert len(machines) >= 20
+    assert len(worn) >= 15
+    assert len({colour for outfit in OUTFITS for colour in outfit}) >= 12
+    for model in machines:
+        fine, coarse = (len(mesh.faces) for mesh in model.lods)
+        assert coarse < 0.7 * fine
+        assert 1.7 < model.size[0] < 2.3
+        assert 0.6 < model.size[1] < 1.1
+        assert 1.5 < model.size[2] < 1.8
+        assert {Surface.FABRIC, Surface.PALETTE, Surface.TAIL_LAMP, Surface.PLATE} <= set(
+            model.lods[1].surfaces.tolist()
+        )

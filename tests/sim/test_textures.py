@@ -10,7 +10,7 @@ import pytest
 from sim.models import Surface
 from sim.textures import SIZE, texture_array
 
-ONCE = {Surface.SIGN, Surface.PLATE, Surface.TAIL_LAMP, Surface.HEAD_LAMP, Surface.RUBBER}
+ONCE = {Surface.SIGN, Surface.PLATE, Surface.TAIL_LAMP, Surface.HEAD_LAMP, Surface.RUBBER, Surface.PALETTE}
 
 
 def test_shape_type_and_cache():

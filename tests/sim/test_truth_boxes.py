@@ -34,6 +34,7 @@ def vehicles(
         sizes=np.tile([4.0, 1.8, 1.5], (n, 1)),
         colours=np.ones((n, 3), np.float32),
         lamps=np.zeros(n, np.uint8),
+        leans=np.zeros((n, 2)),
     )
 
 

@@ -94,6 +94,7 @@ def bodies(
         sizes=np.array([MODELS[model].size for model in models]).reshape(-1, 3),
         colours=np.linspace(0.1, 0.9, 3 * count, dtype=np.float32).reshape(-1, 3),
         lamps=np.full(count, lamps, np.uint8),
+        leans=np.zeros((count, 2)),
     )
 
 

@@ -145,8 +145,8 @@ def simulated(name: str, count: int, seeds: int = 6) -> Iterator[Image]:
     spec = load(name)
     each = max(1, count // seeds)
     for seed in range(seeds):
-        scene = InCarScene(spec.in_car, seed=seed, rate=spec.rate, seconds=(each * SETTLE + 1) / spec.rate)
-        sensor = Sensor(spec.in_car.sensor, scene.stage.light, scene.camera, spec.rate, seed)
+        scene = InCarScene(spec.params, seed=seed, rate=spec.rate, seconds=(each * SETTLE + 1) / spec.rate)
+        sensor = Sensor(spec.params.sensor, scene.stage.light, scene.camera, spec.rate, seed)
         with GlRenderer(scene.stage, scene.camera) as renderer:
             for tick in range(each * SETTLE):
                 state = scene.step()

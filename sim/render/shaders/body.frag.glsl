@@ -1,6 +1,6 @@
 // Lit, textured bodies. One formula for all surfaces; a table says how each behaves.
 uniform sampler2DArray u_textures;
-uniform vec4 u_material[20];  // share of the body's colour, least reflection, more of it by the alpha, retro-reflection
+uniform vec4 u_material[22];  // share of the body's colour, least reflection, more of it by the alpha, retro-reflection
 uniform float u_street;
 in vec3 v_at;
 in vec3 v_normal;

@@ -3,11 +3,23 @@ in vec3 in_position;
 in vec3 i_position;
 in vec2 i_turn;
 in vec3 i_scale;
+in vec2 i_lean;
+in float in_surface;
 uniform mat4 u_clip;
 invariant gl_Position;
 
 vec3 turned(vec3 v) {
     return vec3(i_turn.x * v.x - i_turn.y * v.y, i_turn.y * v.x + i_turn.x * v.y, v.z);
+}
+
+// Where a vertex stands. What leans is sheared; boughs in the wind do not all move alike.
+#define FOLIAGE 9.0
+vec3 placed(vec3 local) {
+    vec2 aside = i_lean * local.z;
+    if (in_surface == FOLIAGE) {
+        aside *= 1.0 + 0.6 * sin(vec2(dot(local, vec3(1.1, 1.5, 0.7)), dot(local, vec3(1.4, -0.9, 1.2))));
+    }
+    return i_position + turned(local) + vec3(aside, 0.0);
 }
 
 #ifdef ALONE
@@ -17,7 +29,7 @@ flat out ivec4 v_box;
 flat out int v_first;
 
 void main() {
-    gl_Position = u_clip * vec4(i_position + turned(in_position * i_scale), 1.0);
+    gl_Position = u_clip * vec4(placed(in_position * i_scale), 1.0);
     v_box = i_box;
     v_first = i_first;
 }
@@ -29,7 +41,7 @@ uniform vec3 u_sun;
 uniform float u_ground;
 
 void main() {
-    vec3 at = i_position + turned(in_position * i_scale);
+    vec3 at = placed(in_position * i_scale);
     at -= u_sun * (max(at.z - u_ground, 0.0) / u_sun.z);
     gl_Position = u_clip * vec4(at, 1.0);
 }
@@ -38,7 +50,6 @@ void main() {
 #ifdef COLOUR
 in vec3 in_normal;
 in vec2 in_uv;
-in float in_surface;
 in vec4 i_colour;
 in uint i_id;
 uniform vec3 u_forward;
@@ -52,7 +63,7 @@ out float v_depth;
 
 void main() {
     vec3 local = in_position * i_scale;
-    v_at = i_position + turned(local);
+    v_at = placed(local);
     v_normal = turned(in_normal / i_scale);
     v_uv = vec3(in_uv, in_surface);
     v_colour = i_colour;

@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 
 from scenarios.log import EpisodeLog, TraceLog
+from scenarios.shown import ShownLog
 from sim.truth.types import FrameTruth
 from sim.world import Kind, Role
 from tracker.types import Label, Status, Tracks
 
 CAR = 1 << 20
+NOTHING_SHOWN = ShownLog(detections=None, flags=None, mask_px=None, object_px=None)
 RATE = 10
 
 
@@ -26,6 +28,7 @@ class Car:
     visible: float = 1.0
     in_frame: float = 1.0
     occluder: int = 0
+    speed: float = 8.0
 
 
 def frame_truth(tick: int, cars: Sequence[Car]) -> FrameTruth:
@@ -45,7 +48,7 @@ def frame_truth(tick: int, cars: Sequence[Car]) -> FrameTruth:
         occluder_ids=np.array([car.occluder for car in cars], np.uint32),
         distances=np.array([car.distance for car in cars], float),
         positions=np.zeros((n, 3)),
-        velocities=np.zeros((n, 3)),
+        velocities=np.array([(0.0, 0.0, car.speed) for car in cars], float).reshape(n, 3),
     )
 
 
@@ -117,10 +120,14 @@ def episode(
     traces: TraceLog | None = None,
     has_boxes: bool = True,
     speed: float | Sequence[float] = 20.0,
+    scene: str = "in-car",
+    shown: ShownLog = NOTHING_SHOWN,
+    light: Sequence[float] | None = None,
 ) -> EpisodeLog:
     n = len(cars)
     return EpisodeLog(
         scenario="hand-made",
+        scene=scene,
         spec_id="0",
         seed=0,
         tracker="hand",
@@ -131,6 +138,8 @@ def episode(
         truth=tuple(frame_truth(tick, here) for tick, here in enumerate(cars)),
         tracks=tuple(found) if found is not None else (Tracks.none(),) * n,
         traces=traces,
+        shown=shown,
+        light=np.ones(n) if light is None else np.asarray(light, float),
         ego_speed=np.broadcast_to(np.asarray(speed, float), n).copy(),
         hashes={},
         timing_ms={},

@@ -1,0 +1,116 @@
+"""Paper 3's scene: a camera that stands still above a lane of motorcycles, seen from behind.
+
+The riders are this project's own model (`sim.riders`), not highway-env's vehicles on narrow sublanes: those
+keep to the middle of a lane and change lanes whole, while motorcycles ride at any offset, squeeze through
+gaps and weave. The lane runs east from s = 0, beneath the camera's mast; it and what stands beside it are
+made as the in-car scene's road and scenery are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim import meshes
+from sim.camera import Camera, Pose
+from sim.light import make_light
+from sim.meshes.motorcycles import rider_models
+from sim.params import MotorcycleLaneParams, RoadParams
+from sim.render.types import Stage
+from sim.riders import RiderTraffic
+from sim.rng import stream
+from sim.roads import build_road
+from sim.scenery import place_scenery
+from sim.weather import ChangingLight, Wind
+from sim.world import WorldState
+
+LENGTH = 260.0
+"""Metres of road."""
+FAR = 250.0
+"""Metres: what lies farther is not drawn; the camera looks down."""
+
+
+class MotorcycleLaneScene:
+    """A lane, its riders, light and weather, all from one seed.
+
+    Attributes:
+        rate: Ticks a second.
+        camera: The intrinsics.
+        stage: What stands still, or sways.
+    """
+
+    def __init__(self, params: MotorcycleLaneParams, *, seed: int, rate: int) -> None:
+        """Populate the world.
+
+        Args:
+            params: What to build.
+            seed: Picks one traffic, weather and scenery among all that the parameters allow.
+            rate: Ticks a second.
+        """
+        lane, mount = params.lane, params.camera
+        models = meshes.catalogue() + rider_models()
+        road = build_road(
+            RoadParams(
+                lanes=2, oncoming_lanes=0, lane_width=lane.width / 2, median=0.0, shoulder=lane.shoulder
+            ),
+            LENGTH,
+            stream(seed, "road"),
+        )
+        self._tick = -1
+        self.rate = rate
+        self.camera = Camera(
+            width=mount.width,
+            height=mount.height,
+            focal=mount.focal,
+            cx=mount.width / 2,
+            cy=mount.height / 2,
+            far=FAR,
+        )
+        self.stage = Stage(
+            models=models,
+            scenery=place_scenery(road, params.scenery, params.light.street_lamps, models, seed),
+            ground=road.ground(),
+            light=make_light(params.light, seed),
+        )
+        self._pose = Pose.looking(
+            (0.0, mount.mount_offset - lane.width / 2, mount.mount_height), yaw=mount.yaw, pitch=mount.pitch
+        )
+        self._light = ChangingLight(params.light, seed)
+        self._wind = Wind(self.stage.scenery, 0.01 * params.scenery.wind, seed)
+        self._riders = RiderTraffic(
+            params.riders,
+            lane=(-lane.width, 0.0),
+            far=view_end(self.camera, self._pose),
+            models=models,
+            seed=seed,
+            rate=rate,
+        )
+
+    def step(self, action: NDArray[np.float32] | None = None) -> WorldState:  # noqa: ARG002
+        """Advance one tick; the first call gives tick 0. Nobody takes actions here."""
+        if self._tick >= 0:
+            self._riders.step()
+        self._tick += 1
+        time = self._tick / self.rate
+        return WorldState(
+            tick=self._tick,
+            rate=self.rate,
+            vehicles=self._riders.bodies(),
+            ego=None,
+            lighting=self._light.at(time),
+            sway=self._wind.at(time),
+        )
+
+    def pose(self, state: WorldState) -> Pose:  # noqa: ARG002
+        """Return the camera's pose: always the same."""
+        return self._pose
+
+    def odometer(self, state: WorldState) -> None:
+        """Return nothing: the camera is on no car."""
+
+
+def view_end(camera: Camera, pose: Pose) -> float:
+    """Return how many metres ahead the ground leaves the image, 80 at most."""
+    upper = pose.rotation[2] - pose.rotation[1] * camera.cy / camera.focal
+    fall = -upper[2] / np.hypot(upper[0], upper[1])
+    return min(80.0, float(pose.position[2] / fall)) if fall > 0 else 80.0
