@@ -66,7 +66,8 @@ class Model:
         kind: What it is.
         size: Length, width, height, metres. Bodies of another size are scaled from this one.
         lods: Meshes from fine to coarse.
-        switch: Distances at which the next coarser mesh takes over, metres; one fewer than ``lods``.
+        switch: Distances at which the next coarser mesh takes over, metres, for a focal length of
+            `sim.render.instances.SWITCH_FOCAL`; one fewer than ``lods``.
     """
 
     name: str

@@ -19,8 +19,8 @@ from sim.models import Mesh, Model, Surface
 from sim.textures import PALETTE
 from sim.world import Kind
 
-SWITCH = (17.0,)
-"""Metres at which the coarse mesh takes over: there a rider is about 40 px high."""
+SWITCH = (36.0, 80.0)
+"""Metres at which the coarser meshes take over: there a rider is about 37 px and 16 px high."""
 
 Point = tuple[float, float, float]
 
@@ -113,20 +113,21 @@ class _Tailor(MeshBuilder):
 
 def _person(b: _Tailor, hip: float, jacket: Surface, helmet: Slot, *, detail: int, pillion: bool) -> None:
     """Add a rider who sits at x = ``hip``: legs, jacket, arms, head with helmet."""
-    sides, lean = (4, 6)[detail], 0.10 if pillion else 0.16
+    sides, lean = (3, 4, 6)[detail], 0.10 if pillion else 0.16
     b.slot = Slot.TROUSERS
     for side in (1.0, -1.0):
         knee = (hip + 0.36, side * (0.24 if pillion else 0.21), 0.76)
         foot = (hip + (0.22 if pillion else 0.30), side * 0.22, 0.34)
         b.limb([(hip - 0.02, side * 0.10, 0.84), knee, foot], (0.105, 0.08, 0.055), Surface.PALETTE, sides)
-        b.slot = Slot.BLACK
-        b.box(
-            (foot[0] - 0.08, foot[1] - 0.05, 0.26),
-            (foot[0] + 0.17, foot[1] + 0.05, 0.36),
-            Surface.PALETTE,
-            without="-z",
-        )
-        b.slot = Slot.TROUSERS
+        if detail:
+            b.slot = Slot.BLACK
+            b.box(
+                (foot[0] - 0.08, foot[1] - 0.05, 0.26),
+                (foot[0] + 0.17, foot[1] + 0.05, 0.36),
+                Surface.PALETTE,
+                without="-z",
+            )
+            b.slot = Slot.TROUSERS
     b.slot = Slot.SECOND
     top = hip + lean
     b.loft(
@@ -151,15 +152,15 @@ def _person(b: _Tailor, hip: float, jacket: Surface, helmet: Slot, *, detail: in
     b.slot = Slot.SKIN
     b.limb([(top, 0, 1.36), (top + 0.02, 0, 1.46)], (0.06, 0.06), Surface.PALETTE, sides)
     b.slot = helmet
-    b.ball((top + 0.03, 0, 1.535), (0.135, 0.12, 0.135), Surface.PALETTE, sides + 2, (3, 5)[detail])
-    if detail:
+    b.ball((top + 0.03, 0, 1.535), (0.135, 0.12, 0.135), Surface.PALETTE, sides + 2, (2, 3, 5)[detail])
+    if detail == 2:
         b.slot = Slot.BLACK
         b.box((top + 0.10, -0.09, 1.49), (top + 0.172, 0.09, 1.56), Surface.PALETTE, without="-x")
 
 
 def _machine(b: _Tailor, *, detail: int, fat: float) -> None:
     """Add a machine with a step-through frame: ``fat`` is the half width of its rear."""
-    sides = (5, 9)[detail]
+    sides = (4, 5, 9)[detail]
     aside = np.array([0.0, 0.045, 0.0])  # half the width of a tyre
     for x in (-0.62, 0.63):
         turn = 2 * np.pi * np.arange(sides) / sides
@@ -182,7 +183,7 @@ def _machine(b: _Tailor, *, detail: int, fat: float) -> None:
     b.box((-0.72, -0.12, 0.74), (0.02, 0.12, 0.82), Surface.PALETTE, without="-z")  # seat
     b.limb([(0.63, 0, 0.29), (0.46, 0, 1.00)], (0.05, 0.05), Surface.PALETTE, 4)
     b.limb([(0.44, -0.35, 1.03), (0.44, 0.35, 1.03)], (0.025, 0.025), Surface.PALETTE, 3)
-    if detail:
+    if detail == 2:
         for side in (1.0, -1.0):
             b.limb([(0.44, side * 0.27, 1.03), (0.42, side * 0.33, 1.17)], (0.012, 0.012), Surface.PALETTE, 3)
             b.box((0.40, side * 0.33 - 0.05, 1.15), (0.43, side * 0.33 + 0.05, 1.22), Surface.PALETTE)
@@ -230,7 +231,11 @@ def _sacks(b: _Tailor, detail: int) -> None:
     b.slot = Slot.LOAD
     for side in (1.0, -1.0):
         b.ball(
-            (-0.62, side * 0.31, 0.62), (0.34, 0.17, 0.29), Surface.PALETTE, (5, 8)[detail], (3, 4)[detail]
+            (-0.62, side * 0.31, 0.62),
+            (0.34, 0.17, 0.29),
+            Surface.PALETTE,
+            (4, 5, 8)[detail],
+            (2, 3, 4)[detail],
         )
 
 
@@ -249,7 +254,7 @@ def rider_models() -> tuple[Model, ...]:
     """Return motorcycles with riders, from lone ones to loaded ones; names are unique."""
     models = []
     for shape, (name, build, count) in enumerate(_SHAPES):
-        lods = [_built(build, detail) for detail in (1, 0)]
+        lods = [_built(build, detail) for detail in (2, 1, 0)]
         extent = lods[0].vertices.max(axis=0) - lods[0].vertices.min(axis=0)
         length, width, height = (round(float(size), 3) for size in extent)
         models += [

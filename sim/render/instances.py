@@ -38,6 +38,9 @@ COMMAND = np.dtype(
 CONTACT = np.dtype([("position", "<f4", 3), ("turn", "<f4", 2), ("half", "<f4", 2)])
 """What a vehicle hides of the sky: its footprint on the ground, relative to the camera."""
 
+SWITCH_FOCAL = 800.0
+"""Pixels: the focal length for which models say at what distance a coarser mesh takes over."""
+
 _CONTACT_REACH = 90.0
 _NARROWEST_PX = 0.35
 _BANDS_PER_OCTAVE = 2
@@ -155,7 +158,8 @@ class Library:
         if coarsest:
             level = self._levels[models] - 1
         else:
-            level = (distance[rows, None] >= self._switch[models]).sum(axis=1)
+            apparent = distance[rows, None] * (SWITCH_FOCAL / camera.focal)
+            level = (apparent >= self._switch[models]).sum(axis=1)
         return Selection(rows=rows, meshes=(self._first_mesh[models] + level).astype(np.int32))
 
     def instances(self, bodies: Bodies, selection: Selection, pose: Pose) -> NDArray[np.void]:

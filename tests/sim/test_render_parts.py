@@ -6,7 +6,7 @@ import pytest
 from sim.camera import Pose
 from sim.models import Surface
 from sim.render.ground import cut, fractal, mark_table
-from sim.render.instances import Library, in_bands
+from sim.render.instances import SWITCH_FOCAL, Library, in_bands
 from sim.render.lamps import LIGHTS, LampPlan, _centres, halos, lights
 from sim.rng import stream
 from sim.world import FIRST_VEHICLE_ID, Lamps
@@ -82,7 +82,8 @@ def test_levels_of_detail_follow_the_distance_and_bands_keep_all():
     cars = state().vehicles
     chosen = library.select(cars, CAMERA, POSE)
     distance = np.linalg.norm(cars.positions[chosen.rows] - POSE.position + [0, 0, 0.75], axis=1)
-    np.testing.assert_array_equal(chosen.meshes == 1, distance >= 60.0)
+    # The camera's short focal length shows everything small: the coarse mesh takes over sooner.
+    np.testing.assert_array_equal(chosen.meshes == 1, distance >= 60.0 * CAMERA.focal / SWITCH_FOCAL)
     banded = in_bands(cars, chosen, POSE)
     assert sorted(banded.rows.tolist()) == sorted(chosen.rows.tolist())
     commands = library.commands(banded.meshes)
