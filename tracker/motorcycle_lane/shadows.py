@@ -8,6 +8,7 @@ darkness, which is learnt as the mode of what looks like one.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -16,28 +17,36 @@ REACH = 2
 """Half side of the window, px."""
 DARKEST, BRIGHTEST = 0.3, 0.95
 """Ratios to the background image that a shadow may have."""
-COLOURED = 0.14
-"""Greatest difference between the channels' mean ratios, over their mean: light from the sky."""
-UNEVEN = 0.1
+BLUEST, REDDEST = 0.35, -0.1
+"""Tints that a shadow may have: ratio of blue minus that of red, over their mean. Its light is the sky's."""
+GREENEST = 0.08
+"""How far green may lie from the middle of red and blue, over the mean."""
+UNEVEN = 0.12
 """Greatest relative standard deviation of the ratio in the window."""
-BINS = 65
+BINS = (26, 18)
+"""Of the histogram of darkness and tint."""
+EDGE = 7
+"""Side of the neighbourhood, px, in which a shadow may be uneven."""
 FADING = 0.98
-TOLERANCE = 0.12
-"""How much darker than the mode a shadow may be; brighter is its rim."""
+DARKER, OFF_TINT = 0.16, 0.12
+"""How much darker than the mode a shadow may be, and how far off its tint; what is brighter is its rim."""
 
 
 @njit(cache=True)
 def darkness(image, background, mask):  # type: ignore[no-untyped-def]
-    """Return (H, W) float32 by how much each foreground pixel is the road darkened; 0 where it is not.
+    """Tell by how much each foreground pixel is the road darkened.
 
     Args:
         image: (H, W, 3) uint8.
         background: (H, W, 3) uint8.
         mask: (H, W) bool, foreground.
+
+    Returns:
+        (H, W, 3) float32: the ratio to the background, 0 where it is no shadow's; its tint; and its relative
+        standard deviation in the window.
     """
     height, width = mask.shape
-    found = np.zeros((height, width), np.float32)
-    ratios = np.empty(3)
+    found = np.zeros((height, width, 3), np.float32)
     for y in range(height):
         for x in range(width):
             if not mask[y, x]:
@@ -63,11 +72,12 @@ def darkness(image, background, mask):  # type: ignore[no-untyped-def]
             mean = (now0 + now1 + now2) / (then0 + then1 + then2 + 1.0)
             if mean < DARKEST or mean > BRIGHTEST:
                 continue
-            ratios[0], ratios[1], ratios[2] = now0 / (then0 + 1.0), now1 / (then1 + 1.0), now2 / (then2 + 1.0)
+            red, green, blue = now0 / (then0 + 1.0), now1 / (then1 + 1.0), now2 / (then2 + 1.0)
+            tint = (blue - red) / mean
             first /= count
-            variance = second / count - first * first
-            if ratios.max() - ratios.min() <= COLOURED * mean and variance <= (UNEVEN * mean) ** 2:
-                found[y, x] = mean
+            spread = np.sqrt(max(second / count - first * first, 0.0)) / mean
+            if REDDEST < tint < BLUEST and abs(green - 0.5 * (red + blue)) <= GREENEST * mean:
+                found[y, x] = mean, tint, spread
     return found
 
 
@@ -87,12 +97,23 @@ class Shadows:
             background: (H, W, 3) RGB, the background image.
             mask: (H, W) raw foreground.
         """
-        ratios = darkness(image, background, mask)
-        values = ratios[ratios > 0.0]
-        counts, edges = np.histogram(values, BINS, (DARKEST, BRIGHTEST))
+        found = darkness(image, background, mask)
+        ratios, tints, spread = found[..., 0], found[..., 1], found[..., 2]
+        likely = (ratios > 0.0) & (spread < UNEVEN)
+        counts, dark_edges, tint_edges = np.histogram2d(
+            ratios[likely], tints[likely], BINS, ((DARKEST, BRIGHTEST), (REDDEST, BLUEST))
+        )
         self._counts = FADING * self._counts + counts
         if not self._counts.any():
             return mask
-        smooth = np.convolve(self._counts, np.ones(7), "same")
-        mode = 0.5 * (edges[smooth.argmax()] + edges[smooth.argmax() + 1])
-        return np.asarray(mask & ~(ratios > mode - TOLERANCE))
+        smooth = cv2.blur(self._counts, (3, 3), borderType=cv2.BORDER_CONSTANT)
+        i, j = np.unravel_index(smooth.argmax(), smooth.shape)
+        dark = 0.5 * (dark_edges[i] + dark_edges[i + 1])
+        tint = 0.5 * (tint_edges[j] + tint_edges[j + 1])
+        # A rim has less of both: a part of the sun still shines there.
+        expected = tint * (1.0 - ratios) / (1.0 - dark)
+        dim = (ratios > dark - DARKER) & (np.abs(tints - expected) < OFF_TINT)
+        sure = dim & likely
+        # At its edges the window reaches beyond a shadow.
+        near = cv2.dilate(sure.astype(np.uint8), np.ones((EDGE, EDGE), np.uint8)) > 0
+        return np.asarray(mask & ~(sure | (dim & near)))

@@ -215,16 +215,18 @@ def unexplained(shape, groups, group, window, centres, sizes, offsets, slopes): 
                     gain[y - top, x - left] *= 1.0 - _cover(shape, x, y, centres[k], sizes[k])
     best, best_x, best_y = -1.0, 0.5 * (x0 + x1), 0.5 * (y0 + y1)
     centre, size = np.empty(2), np.empty(2)
-    rows = max(1, int((y1 - y0) / 2.0) + 1)
-    columns = max(1, int((x1 - x0) / 2.0) + 1)
+    step = max(2.0, 0.12 * (offsets[0] + slopes[0] * 0.5 * (y0 + y1)))
+    rows = max(1, int((y1 - y0) / step) + 1)
+    columns = max(1, int((x1 - x0) / step) + 1)
     for i in range(rows):
         for j in range(columns):
-            centre[0], centre[1] = x0 + 2.0 * j, y0 + 2.0 * i
+            centre[0], centre[1] = x0 + step * j, y0 + step * i
             for c in range(2):
                 size[c] = max(offsets[c] + slopes[c] * centre[1], 4.0)
             total, value = 1e-9, 0.0
-            for y in range(int(centre[1] - 0.5 * size[1]), int(centre[1] + 0.5 * size[1]) + 1, 2):
-                for x in range(int(centre[0] - 0.5 * size[0]), int(centre[0] + 0.5 * size[0]) + 1, 2):
+            stride = 3 if size[0] >= 18.0 else 2
+            for y in range(int(centre[1] - 0.5 * size[1]), int(centre[1] + 0.5 * size[1]) + 1, stride):
+                for x in range(int(centre[0] - 0.5 * size[0]), int(centre[0] + 0.5 * size[0]) + 1, stride):
                     covered = _cover(shape, x, y, centre, size)
                     total += covered
                     if top <= y < bottom and left <= x < right:
