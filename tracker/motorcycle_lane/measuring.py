@@ -31,6 +31,7 @@ LEAST_WORTH = 0.45
 LEAST_SEEN = 0.25
 """Smallest share of a silhouette that must be seen to measure where it is."""
 MOST_ADDED = 8
+CORE = 0.25
 LIMIT = 1.5
 """Log likelihood ratios of a pixel's colour lie between this and its negative."""
 SWEEPS = 2
@@ -97,6 +98,32 @@ def count_inside(labels, boxes, regions):  # type: ignore[no-untyped-def]
     return counts
 
 
+@njit(cache=True)
+def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
+    """Return the boxes (N, 4) of labelled regions without what sticks out: rests of shadows, and specks.
+
+    A column belongs to the core if it holds `CORE` of the box's height or more, and a row likewise.
+
+    Args:
+        labels: (H, W) int32, region k has k + 1.
+        boxes: (N, 4) of the regions.
+    """
+    found = boxes.copy()
+    for k in range(boxes.shape[0]):
+        x0, y0, x1, y1 = int(boxes[k, 0]), int(boxes[k, 1]), int(boxes[k, 2]), int(boxes[k, 3])
+        columns, rows = np.zeros(x1 - x0), np.zeros(y1 - y0)
+        for y in range(y0, y1):
+            for x in range(x0, x1):
+                if labels[y, x] == k + 1:
+                    columns[x - x0] += 1.0
+                    rows[y - y0] += 1.0
+        wide, tall = np.flatnonzero(columns >= CORE * (y1 - y0)), np.flatnonzero(rows >= CORE * (x1 - x0))
+        if wide.size and tall.size:
+            found[k, 0], found[k, 2] = x0 + wide[0], x0 + wide[-1] + 1
+            found[k, 1], found[k, 3] = y0 + tall[0], y0 + tall[-1] + 1
+    return found
+
+
 class Measurer:
     """Measures riders, and learns from those alone how large they are and what shape they have."""
 
@@ -122,8 +149,9 @@ class Measurer:
             for k in np.unique(of_blob[of_blob >= 0])
         ]
         groups += [(np.zeros(0, np.int64), np.array([b])) for b in np.flatnonzero(of_blob < 0)]
-        shown = blobs.boxes[:, 2:] - blobs.boxes[:, :2]
-        middles = 0.5 * (blobs.boxes[:, :2] + blobs.boxes[:, 2:])
+        cores = core_boxes(blobs.labels, blobs.boxes)
+        shown = cores[:, 2:] - cores[:, :2]
+        middles = 0.5 * (cores[:, :2] + cores[:, 2:])
         known = self.sizes.known(middles[:, 1])
         usual = self.sizes.sizes(middles[:, 1])
         numbers = np.zeros(len(blobs) + 1, np.int32)
@@ -166,7 +194,7 @@ class Measurer:
             x0, y0 = blobs.boxes[regions, :2].min(0)
             x1, y1 = blobs.boxes[regions, 2:].max(0)
             found.append(self._explain(owner, number + 1, bins, (x0, y0, x1, y1), expected, tracks, joined))
-        self._learn(sight, np.array(samples, np.int64), chosen)
+        self._learn(blobs.labels, cores, np.array(samples, np.int64), chosen)
         return _together(found, joined)
 
     def _explain(
@@ -222,15 +250,20 @@ class Measurer:
         bottom = y1 - (0.35 * h_bottom if y1 < self._frame[1] else 0.0)
         return left, top, max(left, right), max(top, bottom)
 
-    def _learn(self, sight: Sight, samples: NDArray[np.int64], alone: NDArray[np.int64]) -> None:
-        blobs = sight.blobs
+    def _learn(
+        self,
+        labels: NDArray[np.int32],
+        cores: Floats,
+        samples: NDArray[np.int64],
+        alone: NDArray[np.int64],
+    ) -> None:
         if not len(samples):
             return
-        boxes = blobs.boxes[samples]
+        boxes = cores[samples]
         self.sizes.learn(0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 2:] - boxes[:, :2])
         for b in np.intersect1d(samples, alone):
-            x0, y0, x1, y1 = blobs.boxes[b].astype(int)
-            self.silhouette.learn(blobs.labels[y0:y1, x0:x1] == b + 1)
+            x0, y0, x1, y1 = cores[b].astype(int)
+            self.silhouette.learn(labels[y0:y1, x0:x1] == b + 1)
 
 
 def _tell_apart(references: Floats) -> Floats:
