@@ -30,7 +30,7 @@ LEAST_WORTH = 0.45
 """How well a silhouette that no track expects must explain foreground."""
 LEAST_SEEN = 0.25
 """Smallest share of a silhouette that must be seen to measure where it is."""
-MOST_ADDED = 8
+MOST_ADDED = 4
 CORE = 0.25
 LIMIT = 1.5
 """Log likelihood ratios of a pixel's colour lie between this and its negative."""

@@ -54,49 +54,68 @@ def _cover(shape, x, y, centre, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _neighbours(centres, sizes, k, reach, found):  # type: ignore[no-untyped-def]
-    count = 0
-    for other in range(centres.shape[0]):
-        across = abs(centres[other, 0] - centres[k, 0]) - 0.5 * (sizes[other, 0] + sizes[k, 0])
-        down = abs(centres[other, 1] - centres[k, 1]) - 0.5 * (sizes[other, 1] + sizes[k, 1])
-        if other != k and across < reach and down < reach:
-            found[count] = other
-            count += 1
-    return count
+def _gains(shape, groups, group, bins, centres, sizes, k, table, x0, y0, across, down):  # type: ignore[no-untyped-def]
+    """Return what each pixel of a window is worth to silhouette k, given where the others stand.
+
+    Returns:
+        (down, across) for its upper half, for its lower half, and how far the pixel is foreground that no
+        nearer silhouette covers.
+    """
+    height, width = groups.shape
+    free, shown = np.ones((down, across)), np.ones((down, across))
+    foot = centres[k, 1] + 0.5 * sizes[k, 1]
+    for n in range(centres.shape[0]):
+        if n == k:
+            continue
+        nearer = centres[n, 1] + 0.5 * sizes[n, 1] > foot
+        left, top = (
+            int(np.floor(centres[n, 0] - 0.5 * sizes[n, 0])),
+            int(np.floor(centres[n, 1] - 0.5 * sizes[n, 1])),
+        )
+        right, bottom = (
+            int(np.ceil(centres[n, 0] + 0.5 * sizes[n, 0])),
+            int(np.ceil(centres[n, 1] + 0.5 * sizes[n, 1])),
+        )
+        for y in range(max(top, y0), min(bottom, y0 + down)):
+            for x in range(max(left, x0), min(right, x0 + across)):
+                rest = 1.0 - _cover(shape, x, y, centres[n], sizes[n])
+                free[y - y0, x - x0] *= rest
+                if nearer:
+                    shown[y - y0, x - x0] *= rest
+    upper, lower = np.zeros((down, across)), np.zeros((down, across))
+    for i in range(down):
+        for j in range(across):
+            y, x = i + y0, j + x0
+            if x < 0 or y < 0 or x >= width or y >= height or groups[y, x] != group:
+                shown[i, j] = 0.0
+                if 0 <= x < width and 0 <= y < height and groups[y, x] == 0:
+                    upper[i, j] = lower[i, j] = -ON_BACKGROUND
+            else:
+                upper[i, j] = free[i, j] + COLOUR * shown[i, j] * table[0, bins[y, x]]
+                lower[i, j] = free[i, j] + COLOUR * shown[i, j] * table[1, bins[y, x]]
+    return upper, lower, shown
 
 
 @njit(cache=True)
-def _value(shape, groups, group, bins, centres, sizes, k, place, table, others, count, stride):  # type: ignore[no-untyped-def]
-    """Return how well silhouette k stands at ``place``, and which share of it is seen there."""
-    height, width = groups.shape
-    size = sizes[k]
-    foot = place[1] + 0.5 * size[1]
+def _mean(shape, upper, lower, x0, y0, place, size, stride):  # type: ignore[no-untyped-def]
+    """Return the mean of a window's pixels, weighed by a silhouette that stands at ``place``."""
+    down, across = upper.shape
+    total, value = 1e-9, 0.0
     left, top = int(np.floor(place[0] - 0.5 * size[0])), int(np.floor(place[1] - 0.5 * size[1]))
-    total, value, seen = 1e-9, 0.0, 0.0
     for y in range(top, int(np.ceil(place[1] + 0.5 * size[1])), stride):
-        region = 0 if y + 0.5 < place[1] else 1
+        half = upper if y + 0.5 < place[1] else lower
         for x in range(left, int(np.ceil(place[0] + 0.5 * size[0])), stride):
             covered = _cover(shape, x, y, place, size)
-            if covered == 0.0:
-                continue
             total += covered
-            if x < 0 or y < 0 or x >= width or y >= height:
-                continue
-            here = groups[y, x]
-            if here == 0:
-                value -= ON_BACKGROUND * covered
-            if here != group:
-                continue
-            free, shown = 1.0, 1.0
-            for n in range(count):
-                other = others[n]
-                rest = 1.0 - _cover(shape, x, y, centres[other], sizes[other])
-                free *= rest
-                if centres[other, 1] + 0.5 * sizes[other, 1] > foot:
-                    shown *= rest
-            value += covered * (free + COLOUR * shown * table[region, bins[y, x]])
-            seen += covered * shown
-    return value / total, seen / total
+            if x0 <= x < x0 + across and y0 <= y < y0 + down:
+                value += covered * half[y - y0, x - x0]
+    return value / total
+
+
+@njit(cache=True)
+def _window(centre, size, reach):  # type: ignore[no-untyped-def]
+    x0, y0 = int(centre[0] - 0.5 * size[0] - reach), int(centre[1] - 0.5 * size[1] - reach)
+    return x0, y0, int(size[0] + 2 * reach) + 3, int(size[1] + 2 * reach) + 3
 
 
 @njit(cache=True)
@@ -119,58 +138,39 @@ def place(shape, groups, group, bins, centres, sizes, tables, sweeps):  # type: 
     count = centres.shape[0]
     expected = centres.copy()
     order = np.argsort(-(centres[:, 1] + 0.5 * sizes[:, 1]))
-    others, trial, shares = np.empty(count, np.int64), np.empty(2), np.zeros(count)
+    trial, shares = np.empty(2), np.zeros(count)
     for _ in range(sweeps):
         for k in order:
-            near = _neighbours(centres, sizes, k, 0.5 * sizes[k, 1], others)
-            best, _ = _worth(
-                shape, groups, group, bins, centres, sizes, k, centres[k], tables[k], others, near, expected
+            size, stride = sizes[k], 2 if sizes[k, 0] >= 12.0 else 1
+            reach = 2.0 + 0.3 * size[1]
+            x0, y0, across, down = _window(centres[k], size, reach)
+            upper, lower, _ = _gains(
+                shape, groups, group, bins, centres, sizes, k, tables[k], x0, y0, across, down
             )
-            step = 2.0
-            for _ in range(24):
-                origin_x, origin_y = centres[k, 0], centres[k, 1]
-                better = False
-                for dy in range(-1, 2):
-                    for dx in range(-1, 2):
-                        trial[0], trial[1] = origin_x + step * dx, origin_y + step * dy
-                        if dx == 0 and dy == 0:
-                            continue
-                        value, _ = _worth(
-                            shape,
-                            groups,
-                            group,
-                            bins,
-                            centres,
-                            sizes,
-                            k,
-                            trial,
-                            tables[k],
-                            others,
-                            near,
-                            expected,
-                        )
-                        if value > best + 1e-9:
-                            best, better = value, True
-                            centres[k, 0], centres[k, 1] = trial[0], trial[1]
+            start_x, start_y, step, best = centres[k, 0], centres[k, 1], 2.0, -np.inf
+            while True:
+                origin_x, origin_y, better = centres[k, 0], centres[k, 1], False
+                for move in range(9):
+                    trial[0] = origin_x + step * (move % 3 - 1)
+                    trial[1] = origin_y + step * (move // 3 - 1)
+                    if max(abs(trial[0] - start_x), abs(trial[1] - start_y)) > reach:
+                        continue
+                    off = ((trial[0] - expected[k, 0]) / size[0]) ** 2 + (
+                        (trial[1] - expected[k, 1]) / size[1]
+                    ) ** 2
+                    value = _mean(shape, upper, lower, x0, y0, trial, size, stride) - PULL * off
+                    if value > best + 1e-9:
+                        best, better = value, True
+                        centres[k, 0], centres[k, 1] = trial[0], trial[1]
                 if not better:
                     if step == 1.0:
                         break
                     step = 1.0
     for k in range(count):
-        near = _neighbours(centres, sizes, k, 0.0, others)
-        _, shares[k] = _value(
-            shape, groups, group, bins, centres, sizes, k, centres[k], tables[k], others, near, 1
-        )
+        x0, y0, across, down = _window(centres[k], sizes[k], 0.0)
+        _, _, shown = _gains(shape, groups, group, bins, centres, sizes, k, tables[k], x0, y0, across, down)
+        shares[k] = _mean(shape, shown, shown, x0, y0, centres[k], sizes[k], 1)
     return shares
-
-
-@njit(cache=True)
-def _worth(shape, groups, group, bins, centres, sizes, k, at, table, others, near, expected):  # type: ignore[no-untyped-def]
-    stride = 2 if sizes[k, 0] >= 12.0 else 1
-    value, seen = _value(shape, groups, group, bins, centres, sizes, k, at, table, others, near, stride)
-    across = (at[0] - expected[k, 0]) / sizes[k, 0]
-    down = (at[1] - expected[k, 1]) / sizes[k, 1]
-    return value - PULL * (across * across + down * down), seen
 
 
 @njit(cache=True)
@@ -240,27 +240,16 @@ def unexplained(shape, groups, group, window, centres, sizes, offsets, slopes): 
 def colours(shape, groups, group, bins, centres, sizes, size_of_histogram):  # type: ignore[no-untyped-def]
     """Return (K, 2, size_of_histogram) colours of what is seen of each silhouette; each sums to 1."""
     count = centres.shape[0]
-    height, width = groups.shape
-    others = np.empty(count, np.int64)
     found = np.zeros((count, 2, size_of_histogram))
+    even = np.zeros((2, size_of_histogram))
     for k in range(count):
-        near = _neighbours(centres, sizes, k, 0.0, others)
-        foot = centres[k, 1] + 0.5 * sizes[k, 1]
-        for y in range(max(int(centres[k, 1] - 0.5 * sizes[k, 1]), 0), min(int(foot) + 1, height)):
-            region = 0 if y + 0.5 < centres[k, 1] else 1
-            for x in range(
-                max(int(centres[k, 0] - 0.5 * sizes[k, 0]), 0),
-                min(int(centres[k, 0] + 0.5 * sizes[k, 0]) + 1, width),
-            ):
-                if groups[y, x] != group:
-                    continue
-                shown = _cover(shape, x, y, centres[k], sizes[k])
-                for n in range(near):
-                    other = others[n]
-                    if centres[other, 1] + 0.5 * sizes[other, 1] > foot:
-                        shown *= 1.0 - _cover(shape, x, y, centres[other], sizes[other])
-                if shown > OWNED:
-                    found[k, region, bins[y, x]] += 1.0
+        x0, y0, across, down = _window(centres[k], sizes[k], 0.0)
+        _, _, shown = _gains(shape, groups, group, bins, centres, sizes, k, even, x0, y0, across, down)
+        for i in range(down):
+            region = 0 if i + y0 + 0.5 < centres[k, 1] else 1
+            for j in range(across):
+                if shown[i, j] * _cover(shape, j + x0, i + y0, centres[k], sizes[k]) > OWNED:
+                    found[k, region, bins[i + y0, j + x0]] += 1.0
         for region in range(2):
             total = found[k, region].sum()
             if total > 0.0:

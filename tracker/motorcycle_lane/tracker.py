@@ -15,7 +15,7 @@ from tracker.motorcycle_lane.flow import Flow
 from tracker.motorcycle_lane.front_end import look
 from tracker.motorcycle_lane.measuring import Measurer
 from tracker.motorcycle_lane.shadows import Shadows
-from tracker.motorcycle_lane.tracks import COASTING_MISSES, TrackStore
+from tracker.motorcycle_lane.tracks import TrackStore
 from tracker.types import Diagnostics, Frame, Info, Predictions, Status, Tracks
 
 # Of the filter's state (x, vx, y, vy) the order that is shown: cx, cy, vx, vy.
@@ -69,23 +69,18 @@ class MotorcycleLaneTracker:
         joined[at] = seen.joined
         store.update(seen, joined)
         tracks = store.tracks
-        sure = tracks.confirmed
-        gone = sure & tracks.moved(1.0)
+        status = store.status()
+        gone = (status == Status.CONFIRMED) & tracks.moved(1.0)
         flags = self._flow.step(
             tracks.ids[gone], tracks.centres[gone], tracks.velocities[gone], tracks.sizes[gone, 1]
         )
         self._diagnostics = Diagnostics(
             detections=self._clip(seen.boxes), mask=sight.mask, predictions=predictions, flags=flags
         )
-        status = np.where(
-            ~sure,
-            Status.TENTATIVE,
-            np.where(tracks.misses > COASTING_MISSES, Status.COASTING, Status.CONFIRMED),
-        )
         return Tracks(
             ids=tracks.ids.copy(),
             boxes=self._clip(tracks.boxes),
-            status=status.astype(np.uint8),
+            status=status,
             score=tracks.existence.copy(),
             state=tracks.mean[:, SHOWN],
             covariance=tracks.covariance[:, SHOWN[:, None], SHOWN],

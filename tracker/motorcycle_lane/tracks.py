@@ -12,17 +12,18 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.boxes import box_area, intersection
+from tracker.boxes import box_area, intersection, iou
 from tracker.filtering import coalescence, jpda, planar
 from tracker.motorcycle_lane import colour
 from tracker.motorcycle_lane.measuring import Expected, Measurements
 from tracker.motorcycle_lane.sizes import SizeModel
+from tracker.types import Status
 
 Floats = NDArray[np.float64]
 
 DETECTION = 0.75
 """P_D of a rider in full view. A miss is seldom alone, so it is lower than the share of frames with one."""
-LEAST_DETECTION = 0.03
+LEAST_DETECTION = 0.1
 HIDDEN, SHOWN = 0.2, 0.6
 """Shares of a rider in view at which P_D is least, and full."""
 GATE = 0.999
@@ -38,7 +39,17 @@ SURVIVAL = 0.998
 BIRTH, BORDER_BIRTH = 0.15, 0.5
 """Existence of a new track inside the picture, and at its border."""
 MOST_SURE = 0.9999
-GONE = 0.002
+GONE, NEVER_CAME = 0.002, 0.05
+"""Existence below which a confirmed track ends, and one that is not."""
+STILL = 0.4
+"""Rider heights a second below which a track stands."""
+PARKED, GHOST = 3.0, 0.5
+"""Seconds of standing after which a rider is parked; and after which what has never gone a rider's height is
+what was left of the training's traffic in the background."""
+LONGEST_MISS = 1.0
+"""Seconds after which a track that was not measured ends, hidden or not."""
+SAME = 0.6
+"""IoU from which a track that is not confirmed, or was missed, is the other's double."""
 CONFIRMED, CONFIRMING_HITS = 0.9, 3
 MOVED = 0.4
 """Rider heights that a track must have gone to be confirmed: leaves sway, and lights flicker, in place."""
@@ -64,6 +75,7 @@ class TrackArrays:
         misses: (N,) int64 successive frames in which it was not.
         confirmed: (N,) bool.
         sized: (N,) int64 frames in which its size was measured.
+        stood: (N,) int64 successive frames in which it stood still.
         origins: (N, 2) where each was first seen, px.
     """
 
@@ -77,6 +89,7 @@ class TrackArrays:
     misses: NDArray[np.int64]
     confirmed: NDArray[np.bool_]
     sized: NDArray[np.int64]
+    stood: NDArray[np.int64]
     origins: Floats
 
     def __len__(self) -> int:
@@ -96,6 +109,7 @@ class TrackArrays:
             misses=np.zeros(0, np.int64),
             confirmed=np.zeros(0, np.bool_),
             sized=np.zeros(0, np.int64),
+            stood=np.zeros(0, np.int64),
             origins=np.zeros((0, 2)),
         )
 
@@ -168,6 +182,15 @@ class TrackStore:
             centres=t.centres[at], sizes=t.sizes[at], references=t.references[at], moved=t.moved(1.0)[at]
         )
 
+    def status(self) -> NDArray[np.uint8]:
+        """Return (N,) a `tracker.types.Status` of each track."""
+        t = self.tracks
+        stood = t.stood * self._step
+        ghost = (stood > GHOST) & ~t.moved(1.0)
+        resting = (t.misses > COASTING_MISSES) | (stood > PARKED)
+        found = np.where(resting, Status.COASTING, Status.CONFIRMED)
+        return np.where(t.confirmed & ~ghost, found, Status.TENTATIVE).astype(np.uint8)
+
     def in_view(self) -> Floats:
         """Return (N,) the share of each track's box in the picture and not behind a nearer rider's."""
         t = self.tracks
@@ -216,6 +239,8 @@ class TrackStore:
         t.hits = t.hits + hit
         t.misses = np.where(hit, 0, t.misses + 1)
         t.confirmed = t.confirmed | ((t.existence > CONFIRMED) & (t.hits >= CONFIRMING_HITS) & t.moved(MOVED))
+        still = np.hypot(*t.velocities.T) < STILL * t.sizes[:, 1]
+        t.stood = np.where(still, t.stood + 1, 0)
         self._learn(seen, beta)
         self.beta = beta
         return np.asarray(1.0 - beta[:, 1:].sum(0))
@@ -240,7 +265,12 @@ class TrackStore:
             return
         boxes = t.boxes
         inside = intersection(boxes, self._frame)[:, 0] / np.maximum(box_area(boxes), 1e-9)
-        ended = (t.existence < GONE) | (inside < IN_FRAME)
+        ended = (t.existence < np.where(t.confirmed, GONE, NEVER_CAME)) | (inside < IN_FRAME)
+        ended |= t.misses > LONGEST_MISS / self._step
+        # Of two at one place the one that was measured more often is right.
+        doubtful = ~t.confirmed | (t.misses > COASTING_MISSES)
+        better = t.hits[None, :] > t.hits[:, None]
+        ended |= doubtful & ((iou(boxes, boxes) > SAME) & better).any(1)
         left = t.references[ended & t.confirmed]
         self._others = np.concatenate([self._others, left])[-32:]
         t.keep(~ended)
@@ -270,6 +300,7 @@ class TrackStore:
                 misses=np.zeros(count, np.int64),
                 confirmed=np.zeros(count, np.bool_),
                 sized=seen.sized[at].astype(np.int64),
+                stood=np.zeros(count, np.int64),
                 origins=seen.centres[at],
             )
         )
