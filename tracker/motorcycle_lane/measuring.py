@@ -142,7 +142,7 @@ class Measurer:
         linked = inside >= 0.2 * (expected.sizes.prod(1))[:, None]
         linked |= (inside >= 0.5 * blobs.areas) & (blobs.areas > 0)
         of_track, of_blob = components(linked)
-        at_border = (blobs.boxes[:, :2] <= 0).any(1) | (blobs.boxes[:, 2:] >= self._frame).any(1)
+        at_border = np.asarray((blobs.boxes[:, :2] <= 0).any(1) | (blobs.boxes[:, 2:] >= self._frame).any(1))
         # Tracks of a group, and its regions; regions that nobody expects are groups of their own.
         groups = [
             (np.flatnonzero(of_track == k), np.flatnonzero(of_blob == k))

@@ -88,4 +88,4 @@ def robust_lines(places: Floats, sizes: Floats, rounds: int = 5) -> Floats:
 
 def _fitted(design: Floats, sizes: Floats, weights: Floats) -> Floats:
     weighted = design * weights[:, None]
-    return np.linalg.solve(design.T @ weighted + _HELD, weighted.T @ sizes)
+    return np.asarray(np.linalg.solve(design.T @ weighted + _HELD, weighted.T @ sizes), np.float64)
