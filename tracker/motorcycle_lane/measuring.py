@@ -32,6 +32,7 @@ LEAST_SEEN = 0.25
 """Smallest share of a silhouette that must be seen to measure where it is."""
 MOST_ADDED = 4
 CORE = 0.25
+"""Least share of a box that a row or column of a region's core fills."""
 LIMIT = 1.5
 """Log likelihood ratios of a pixel's colour lie between this and its negative."""
 SWEEPS = 2

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-REACH = 2
+REACH = 1
 """Half side of the window, px."""
 DARKEST, BRIGHTEST = 0.3, 0.95
 """Ratios to the background image that a shadow may have."""
@@ -28,7 +28,7 @@ BINS = (26, 18)
 EDGE = 7
 """Side of the neighbourhood, px, in which a shadow may be uneven."""
 FADING = 0.98
-DARKER, OFF_TINT = 0.16, 0.12
+DARKER, OFF_TINT = 0.2, 0.12
 """How much darker than the mode a shadow may be, and how far off its tint; what is brighter is its rim."""
 
 
@@ -97,8 +97,8 @@ class Shadows:
             background: (H, W, 3) RGB, the background image.
             mask: (H, W) raw foreground.
         """
-        found = darkness(image, background, mask)
-        ratios, tints, spread = found[..., 0], found[..., 1], found[..., 2]
+        at = np.nonzero(mask)
+        ratios, tints, spread = darkness(image, background, mask)[at].T
         likely = (ratios > 0.0) & (spread < UNEVEN)
         counts, dark_edges, tint_edges = np.histogram2d(
             ratios[likely], tints[likely], BINS, ((DARKEST, BRIGHTEST), (REDDEST, BLUEST))
@@ -113,7 +113,10 @@ class Shadows:
         # A rim has less of both: a part of the sun still shines there.
         expected = tint * (1.0 - ratios) / (1.0 - dark)
         dim = (ratios > dark - DARKER) & (np.abs(tints - expected) < OFF_TINT)
-        sure = dim & likely
+        sure = np.zeros(mask.shape, np.uint8)
+        sure[at] = dim & likely
         # At its edges the window reaches beyond a shadow.
-        near = cv2.dilate(sure.astype(np.uint8), np.ones((EDGE, EDGE), np.uint8)) > 0
-        return np.asarray(mask & ~(sure | (dim & near)))
+        near = cv2.dilate(sure, np.ones((EDGE, EDGE), np.uint8))
+        left = mask.copy()
+        left[at] = ~(dim & (near[at] > 0))
+        return left

@@ -41,6 +41,8 @@ BIRTH, BORDER_BIRTH = 0.15, 0.5
 MOST_SURE = 0.9999
 GONE, NEVER_CAME = 0.002, 0.05
 """Existence below which a confirmed track ends, and one that is not."""
+SMALLEST_HEIGHT = 14.0
+"""Height that a smaller track is taken to have when its way is judged, px: specks jump by their own size."""
 STILL = 0.4
 """Rider heights a second below which a track stands."""
 PARKED, GHOST = 3.0, 0.5
@@ -140,7 +142,8 @@ class TrackArrays:
 
     def moved(self, heights: float) -> NDArray[np.bool_]:
         """Tell which tracks (N,) are so many rider heights away from where they began."""
-        return np.asarray(np.hypot(*(self.centres - self.origins).T) > heights * self.sizes[:, 1])
+        gone = np.hypot(*(self.centres - self.origins).T)
+        return np.asarray(gone > heights * np.maximum(self.sizes[:, 1], SMALLEST_HEIGHT))
 
 
 class TrackStore:

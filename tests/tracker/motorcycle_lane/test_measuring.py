@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tracker.motorcycle_lane import colour, measuring, silhouettes
 from tracker.motorcycle_lane.blobs import find_blobs
-from tracker.motorcycle_lane.shadows import DARKEST, Shadows, darkness
+from tracker.motorcycle_lane.shadows import DARKEST, REACH, Shadows, darkness
 from tracker.motorcycle_lane.sizes import SizeModel, robust_lines
 
 
@@ -138,7 +138,7 @@ def test_darkness_is_its_plain_twin(seed):
     found = darkness(image, background, mask)
     for y, x in np.ndindex(9, 11):
         near = np.zeros_like(mask)
-        near[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3] = True
+        near[max(y - REACH, 0) : y + REACH + 1, max(x - REACH, 0) : x + REACH + 1] = True
         near &= mask
         now, then = image[near].astype(float).sum(0), background[near].astype(float).sum(0)
         mean = now.sum() / (then.sum() + 1.0)
