@@ -10,6 +10,9 @@ TRACKERS = {
     "in-car": "tracker.in_car.tracker:InCarTracker",
     "in-car:paper": "tracker.in_car.paper:PaperTracker",
     "in-car:per-frame": "tracker.in_car.paper:PerFrameTracker",
+    "motorcycle-lane": "tracker.motorcycle_lane.tracker:MotorcycleLaneTracker",
+    "motorcycle-lane:paper": "tracker.motorcycle_lane.paper:PaperTracker",
+    "motorcycle-lane:mog2-nn": "tracker.motorcycle_lane.nearest:NearestTracker",
 }
 
 

@@ -20,8 +20,8 @@ def transition(step: float) -> Floats:
     return np.kron(np.eye(2), np.array([[1.0, step], [0.0, 1.0]]))
 
 
-def process_noise(step: float, intensity: float) -> Floats:
-    """Return (4, 4) Q of ``step`` seconds.
+def process_noise(step: float, intensity: float | Floats) -> Floats:
+    """Return (4, 4) Q, or (N, 4, 4) of (N, 1, 1) intensities, of ``step`` seconds.
 
     Args:
         step: Seconds.
@@ -29,10 +29,12 @@ def process_noise(step: float, intensity: float) -> Floats:
             and brake harder, and widens the gates.
     """
     along = np.array([[step**3 / 3, step**2 / 2], [step**2 / 2, step]])
-    return intensity * np.kron(np.eye(2), along)
+    return np.asarray(intensity * np.kron(np.eye(2), along))
 
 
-def predict(mean: Floats, covariance: Floats, step: float, intensity: float) -> tuple[Floats, Floats]:
+def predict(
+    mean: Floats, covariance: Floats, step: float, intensity: float | Floats
+) -> tuple[Floats, Floats]:
     """Advance N targets by ``step`` seconds.
 
     Args:

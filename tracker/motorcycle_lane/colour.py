@@ -41,30 +41,45 @@ def _bin(red, green, blue):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _count(image, labels, boxes, counts):  # type: ignore[no-untyped-def]
+def bin_pixels(image, labels):  # type: ignore[no-untyped-def]
+    """Return (H, W) uint8, the colour bin of each labelled pixel of an image (H, W, 3), RGB; 0 elsewhere."""
+    height, width = labels.shape
+    bins = np.zeros((height, width), np.uint8)
+    for y in range(height):
+        for x in range(width):
+            if labels[y, x] > 0:
+                red, green, blue = image[y, x, 0], image[y, x, 1], image[y, x, 2]
+                bins[y, x] = _bin(np.int64(red), np.int64(green), np.int64(blue))
+    return bins
+
+
+@njit(cache=True)
+def _count(bins, labels, numbers, boxes, counts):  # type: ignore[no-untyped-def]
     for k in range(boxes.shape[0]):
         middle = 0.5 * (boxes[k, 1] + boxes[k, 3])
         for y in range(int(boxes[k, 1]), int(boxes[k, 3])):
             region = 0 if y + 0.5 < middle else 1
             for x in range(int(boxes[k, 0]), int(boxes[k, 2])):
-                if labels[y, x] == k + 1:
-                    red, green, blue = image[y, x, 0], image[y, x, 1], image[y, x, 2]
-                    counts[k, region, _bin(np.int64(red), np.int64(green), np.int64(blue))] += 1.0
+                if labels[y, x] == numbers[k]:
+                    counts[k, region, bins[y, x]] += 1.0
 
 
-def histograms(image: NDArray[np.uint8], labels: NDArray[np.int32], boxes: Floats) -> Floats:
+def histograms(
+    bins: NDArray[np.uint8], labels: NDArray[np.int32], numbers: NDArray[np.int64], boxes: Floats
+) -> Floats:
     """Return the colour histograms of N labelled regions.
 
     Args:
-        image: (H, W, 3) RGB.
-        labels: (H, W) int32, region k has k + 1.
+        bins: (H, W) as from `bin_pixels`.
+        labels: (H, W) int32.
+        numbers: (N,) label of each region.
         boxes: (N, 4) of the regions, px.
 
     Returns:
         (N, 2, BINS), each sub-region's sums to 1; one without pixels is even.
     """
     counts = np.zeros((len(boxes), REGIONS, BINS))
-    _count(image, labels, boxes, counts)
+    _count(bins, labels, numbers, boxes, counts)
     totals = counts.sum(2, keepdims=True)
     return np.asarray(np.where(totals > 0, counts / np.maximum(totals, 1.0), 1.0 / BINS))
 

@@ -90,7 +90,9 @@ def test_histograms_count_the_pixels_of_each_half(seed):
     rng = np.random.default_rng(seed)
     image = rng.integers(0, 256, (12, 16, 3)).astype(np.uint8)
     found = find_blobs(rng.random((12, 16)) < 0.35, 3)
-    counted = colour.histograms(image, found.labels, found.boxes)
+    counted = colour.histograms(
+        colour.bin_pixels(image, found.labels), found.labels, np.arange(1, len(found) + 1), found.boxes
+    )
     assert counted.shape == (len(found), 2, colour.BINS)
     for k, (_, y0, _, y1) in enumerate(found.boxes):
         wanted = np.zeros((2, colour.BINS))
@@ -126,7 +128,7 @@ def test_colours_tell_riders_apart():
     for k, (x0, y0, x1, y1) in enumerate(boxes.astype(int)):
         labels[y0:y1, x0:x1] = k + 1
         image[y0:10, x0:x1] = [(200, 30, 30), (30, 40, 190)][k]
-    found = colour.histograms(image, labels, boxes)
+    found = colour.histograms(colour.bin_pixels(image, labels), labels, np.arange(1, 3), boxes)
     ratios = colour.likelihood_ratios(found, found, found)
     assert (np.diag(ratios) > 1.5).all()
     assert np.isclose(ratios[0, 1], 0.1)

@@ -1,0 +1,151 @@
+"""Sizes, silhouettes, cores and shadows: each against a plain twin, or made-up regions of known truth."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tracker.motorcycle_lane import colour, measuring, silhouettes
+from tracker.motorcycle_lane.blobs import find_blobs
+from tracker.motorcycle_lane.shadows import DARKEST, REACH, Shadows, darkness
+from tracker.motorcycle_lane.sizes import SizeModel, robust_lines
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=20, deadline=None)
+def test_sizes_are_those_of_the_single_ones(seed):
+    """A third of the regions are two abreast, a tenth are parts, some are anything."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(0.1, 0.9, 300)
+    truth = np.array([[6.0, 12.0], [20.0, 45.0]])
+    sizes = (truth[0] + truth[1] * places[:, None]) * rng.normal(1.0, 0.06, (300, 2))
+    kind = rng.random(300)
+    sizes[kind < 0.33, 0] *= rng.uniform(1.5, 2.2, (kind < 0.33).sum())
+    sizes[kind > 0.9] *= 0.5
+    sizes[(kind > 0.85) & (kind < 0.9)] *= rng.uniform(1.0, 4.0, ((kind > 0.85) & (kind < 0.9)).sum())[
+        :, None
+    ]
+    lines = robust_lines(places, sizes)
+    for place in (0.1, 0.5, 0.9):
+        wanted = truth[0] + truth[1] * place
+        assert np.abs((lines[0] + lines[1] * place) / wanted - 1.0).max() < 0.12
+
+
+def test_sizes_are_known_only_about_rows_that_were_seen():
+    model = SizeModel(360, 240)
+    assert not model.known(np.array([100.0])).any()
+    rows = np.linspace(60, 120, 40)
+    model.learn(rows, np.stack([0.2 * rows, 0.4 * rows], 1))
+    assert model.known(np.array([20.0, 50.0, 90.0, 130.0, 230.0])).tolist() == [
+        False,
+        True,
+        True,
+        True,
+        False,
+    ]
+    assert np.allclose(model.sizes(np.array([90.0])), [[18.0, 36.0]], rtol=0.02)
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=20, deadline=None)
+def test_pixels_inside_boxes_and_cores(seed):
+    rng = np.random.default_rng(seed)
+    blobs = find_blobs(rng.random((20, 30)) < 0.4, 5)
+    boxes = rng.uniform(-5, 25, (4, 2))
+    boxes = np.concatenate([boxes, boxes + rng.uniform(1, 15, (4, 2))], 1)
+    counts = measuring.count_inside(blobs.labels, boxes, len(blobs))
+    y, x = np.mgrid[:20, :30]
+    for k, (x0, y0, x1, y1) in enumerate(boxes):
+        inside = (x >= max(int(x0), 0)) & (x < np.ceil(x1)) & (y >= max(int(y0), 0)) & (y < np.ceil(y1))
+        assert counts[k].tolist() == [(blobs.labels[inside] == b + 1).sum() for b in range(len(blobs))]
+    for k, (x0, y0, x1, y1) in enumerate(measuring.core_boxes(blobs.labels, blobs.boxes).astype(int)):
+        ax, ay, bx, by = blobs.boxes[k].astype(int)
+        part = blobs.labels[ay:by, ax:bx] == k + 1
+        wide = np.flatnonzero(part.sum(0) >= measuring.CORE * (by - ay))
+        tall = np.flatnonzero(part.sum(1) >= measuring.CORE * (bx - ax))
+        if len(wide) and len(tall):
+            assert (x0, x1, y0, y1) == (ax + wide[0], ax + wide[-1] + 1, ay + tall[0], ay + tall[-1] + 1)
+
+
+def joined_pair(offset):
+    """Two silhouettes of 16 x 36 in one region: shape, groups, bins, centres, sizes, tables."""
+    shape = silhouettes.Silhouette().shape
+    centres = np.array([[40.0, 40.0], [40.0 + offset[0], 40.0 + offset[1]]])
+    sizes = np.full((2, 2), (16.0, 36.0))
+    image, groups = np.full((90, 100, 3), 90, np.uint8), np.zeros((90, 100), np.int32)
+    for k in np.argsort(centres[:, 1]):
+        for y, x in np.ndindex(90, 100):
+            u = int((x + 0.5 - centres[k, 0] + 8) / 16 * silhouettes.COLUMNS // 1)
+            v = int((y + 0.5 - centres[k, 1] + 18) / 36 * silhouettes.ROWS // 1)
+            if 0 <= u < silhouettes.COLUMNS and 0 <= v < silhouettes.ROWS and shape[v, u] > 0.5:
+                image[y, x], groups[y, x] = [(200, 30, 30), (30, 40, 200)][k], 1
+    bins = colour.bin_pixels(image, groups)
+    own = silhouettes.colours(shape, groups, 1, bins, centres, sizes, colour.BINS)
+    tables = np.clip(np.log((own + 0.02) / (own[::-1] + 0.02)), -1.5, 1.5)
+    return shape, groups, bins, centres, sizes, tables
+
+
+def test_silhouettes_find_their_riders_in_one_region():
+    rng = np.random.default_rng(3)
+    for offset in ((12.0, 4.0), (14.0, 0.0), (4.0, 20.0), (-9.0, 14.0)):
+        shape, groups, bins, truth, sizes, tables = joined_pair(offset)
+        centres = truth + rng.uniform(-3, 3, (2, 2))
+        shares = silhouettes.place(shape, groups, 1, bins, centres, sizes, tables, 2)
+        assert np.abs(centres - truth).max() <= 2.5
+        assert (shares > 0.35).all()
+        assert shares[truth[:, 1].argmax()] > 0.85
+
+
+def test_a_rider_that_nobody_expects_is_found_beside_one_that_is():
+    shape, groups, _, truth, sizes, _ = joined_pair((14.0, 2.0))
+    window = np.array([30.0, 30.0, 65.0, 55.0])
+    worth, x, y = silhouettes.unexplained(
+        shape, groups, 1, window, truth[:1], sizes[:1], np.array([16.0, 36.0]), np.zeros(2)
+    )
+    assert worth > 0.6
+    assert np.hypot(x - truth[1, 0], y - truth[1, 1]) < 4.0
+    worth, _, _ = silhouettes.unexplained(
+        shape, groups, 1, window, truth, sizes, np.array([16.0, 36.0]), np.zeros(2)
+    )
+    assert worth < 0.2
+
+
+def test_shadows_are_taken_out_and_dark_clothes_are_not():
+    rng = np.random.default_rng(1)
+    background = np.clip(120 + rng.normal(0, 12, (80, 100, 1)) + [6, 0, -6], 0, 255).astype(np.uint8)
+    picture = background.astype(float)
+    picture[40:60, 50:80] *= np.array([0.55, 0.6, 0.66])
+    picture[20:60, 35:50] = (40, 42, 45)
+    image = np.clip(picture + rng.normal(0, 2, picture.shape), 0, 255).astype(np.uint8)
+    mask = np.zeros((80, 100), bool)
+    mask[40:60, 50:80] = mask[20:60, 35:50] = True
+    before = image.copy(), background.copy(), mask.copy()
+    left = Shadows().remove(image, background, mask)
+    assert left[40:60, 52:80].mean() < 0.05
+    assert left[20:60, 35:48].mean() > 0.9
+    assert not (left & ~mask).any()
+    assert all(np.array_equal(a, b) for a, b in zip(before, (image, background, mask), strict=True))
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=15, deadline=None)
+def test_darkness_is_its_plain_twin(seed):
+    rng = np.random.default_rng(seed)
+    background = rng.integers(90, 110, (9, 11, 3)).astype(np.uint8)
+    image = (background * rng.uniform(0.4, 0.9)).astype(np.uint8)
+    mask = rng.random((9, 11)) < 0.8
+    found = darkness(image, background, mask)
+    for y, x in np.ndindex(9, 11):
+        near = np.zeros_like(mask)
+        near[max(y - REACH, 0) : y + REACH + 1, max(x - REACH, 0) : x + REACH + 1] = True
+        near &= mask
+        now, then = image[near].astype(float).sum(0), background[near].astype(float).sum(0)
+        mean = now.sum() / (then.sum() + 1.0)
+        if not mask[y, x] or mean < DARKEST:
+            assert found[y, x, 0] == 0.0
+            continue
+        red, _, blue = now / (then + 1.0)
+        ratios = (image[near].astype(float).sum(1) + 3) / (background[near].astype(float).sum(1) + 3)
+        wanted = mean, (blue - red) / mean, ratios.std() / mean
+        assert np.allclose(found[y, x], wanted, atol=1e-4)

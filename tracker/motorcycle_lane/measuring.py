@@ -1,0 +1,288 @@
+"""Measurements from the regions of the foreground: one of each rider, also where riders hang together.
+
+A region that one track or none expects, and that has the size of one rider, is one measurement. Any other is
+explained by silhouettes, one for each track that expects to be there and as many more as its foreground
+calls for (`tracker.motorcycle_lane.silhouettes`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tracker.filtering.matchings import components
+from tracker.motorcycle_lane import colour, silhouettes
+from tracker.motorcycle_lane.front_end import Sight
+from tracker.motorcycle_lane.silhouettes import Silhouette
+from tracker.motorcycle_lane.sizes import SizeModel
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+TOO_LARGE = 1.4
+"""A region so many times as wide or as high as a rider holds more than one, or one and something else."""
+TOO_SMALL = 0.06
+"""A region of a smaller share of a rider's box, not at the border, is no rider."""
+LEAST_WORTH = 0.45
+"""How well a silhouette that no track expects must explain foreground."""
+LEAST_SEEN = 0.25
+"""Smallest share of a silhouette that must be seen to measure where it is."""
+MOST_ADDED = 4
+CORE = 0.25
+"""Least share of a box that a row or column of a region's core fills."""
+LIMIT = 1.5
+"""Log likelihood ratios of a pixel's colour lie between this and its negative."""
+SWEEPS = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Expected:
+    """The N riders that are expected in a frame.
+
+    Attributes:
+        centres: (N, 2) of their boxes, px.
+        sizes: (N, 2) width and height, px.
+        references: (N, 2, BINS) their colours.
+        moved: (N,) whether it has gone so far that it must be traffic.
+    """
+
+    centres: Floats
+    sizes: Floats
+    references: Floats
+    moved: Flags
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measurements:
+    """The M riders that are seen in a frame.
+
+    Attributes:
+        centres: (M, 2) of their whole boxes, px.
+        sizes: (M, 2) width and height, px.
+        histograms: (M, 2, BINS) colours of what is seen of each.
+        alone: (M,) whether the rider is a region by itself, so that its size is measured, too.
+        sized: (M,) whether one rider could be told from two by the region's size.
+        shares: (M,) how much of it is seen.
+        joined: (N,) whether an expected rider's region was explained by silhouettes.
+    """
+
+    centres: Floats
+    sizes: Floats
+    histograms: Floats
+    alone: Flags
+    sized: Flags
+    shares: Floats
+    joined: Flags
+
+    def __len__(self) -> int:
+        return len(self.centres)
+
+    @property
+    def boxes(self) -> Floats:
+        """(M, 4) x0, y0, x1, y1."""
+        return np.concatenate([self.centres - 0.5 * self.sizes, self.centres + 0.5 * self.sizes], 1)
+
+
+@njit(cache=True)
+def count_inside(labels, boxes, regions):  # type: ignore[no-untyped-def]
+    """Return (N, regions) int64, how many pixels of each labelled region lie in each box (N, 4)."""
+    height, width = labels.shape
+    counts = np.zeros((boxes.shape[0], regions), np.int64)
+    for k in range(boxes.shape[0]):
+        for y in range(max(int(boxes[k, 1]), 0), min(int(np.ceil(boxes[k, 3])), height)):
+            for x in range(max(int(boxes[k, 0]), 0), min(int(np.ceil(boxes[k, 2])), width)):
+                if labels[y, x] > 0:
+                    counts[k, labels[y, x] - 1] += 1
+    return counts
+
+
+@njit(cache=True)
+def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
+    """Return the boxes (N, 4) of labelled regions without what sticks out: rests of shadows, and specks.
+
+    A column belongs to the core if it holds `CORE` of the box's height or more, and a row likewise.
+
+    Args:
+        labels: (H, W) int32, region k has k + 1.
+        boxes: (N, 4) of the regions.
+    """
+    found = boxes.copy()
+    for k in range(boxes.shape[0]):
+        x0, y0, x1, y1 = int(boxes[k, 0]), int(boxes[k, 1]), int(boxes[k, 2]), int(boxes[k, 3])
+        columns, rows = np.zeros(x1 - x0), np.zeros(y1 - y0)
+        for y in range(y0, y1):
+            for x in range(x0, x1):
+                if labels[y, x] == k + 1:
+                    columns[x - x0] += 1.0
+                    rows[y - y0] += 1.0
+        wide, tall = np.flatnonzero(columns >= CORE * (y1 - y0)), np.flatnonzero(rows >= CORE * (x1 - x0))
+        if wide.size and tall.size:
+            found[k, 0], found[k, 2] = x0 + wide[0], x0 + wide[-1] + 1
+            found[k, 1], found[k, 3] = y0 + tall[0], y0 + tall[-1] + 1
+    return found
+
+
+class Measurer:
+    """Measures riders, and learns from those alone how large they are and what shape they have."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self.sizes = SizeModel(width, height)
+        self.silhouette = Silhouette()
+        self._frame = np.array([width, height], float)
+
+    def measure(self, sight: Sight, expected: Expected) -> Measurements:
+        """Return what is seen, given what is expected."""
+        blobs = sight.blobs
+        bins = colour.bin_pixels(sight.image, blobs.labels)
+        half = 0.5 * expected.sizes
+        boxes = np.concatenate([expected.centres - half, expected.centres + half], 1)
+        inside = count_inside(blobs.labels, boxes, len(blobs))
+        linked = inside >= 0.2 * (expected.sizes.prod(1))[:, None]
+        linked |= (inside >= 0.5 * blobs.areas) & (blobs.areas > 0)
+        of_track, of_blob = components(linked)
+        at_border = np.asarray((blobs.boxes[:, :2] <= 0).any(1) | (blobs.boxes[:, 2:] >= self._frame).any(1))
+        # Tracks of a group, and its regions; regions that nobody expects are groups of their own.
+        groups = [
+            (np.flatnonzero(of_track == k), np.flatnonzero(of_blob == k))
+            for k in np.unique(of_blob[of_blob >= 0])
+        ]
+        groups += [(np.zeros(0, np.int64), np.array([b])) for b in np.flatnonzero(of_blob < 0)]
+        cores = core_boxes(blobs.labels, blobs.boxes)
+        shown = cores[:, 2:] - cores[:, :2]
+        middles = 0.5 * (cores[:, :2] + cores[:, 2:])
+        known = self.sizes.known(middles[:, 1])
+        usual = self.sizes.sizes(middles[:, 1])
+        numbers = np.zeros(len(blobs) + 1, np.int32)
+        joined = np.zeros(len(expected.centres), np.bool_)
+        alone: list[int] = []
+        apart: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
+        samples: list[int] = []
+        for tracks, regions in groups:
+            b = int(regions[0])
+            if expected.moved[tracks].any():
+                samples.extend(regions[~at_border[regions]].tolist())
+            small = blobs.areas[b] < TOO_SMALL * usual[b].prod()
+            if len(tracks) == 0 and known[b] and small and not at_border[b]:
+                continue
+            if len(tracks) < 2 and len(regions) == 1:
+                size = expected.sizes[tracks[0]] if len(tracks) else usual[b]
+                part = len(tracks) > 0 or at_border[b]
+                fits = (shown[b] <= TOO_LARGE * size).all()
+                fits &= not part or (shown[b] >= size / TOO_LARGE).all()
+                if fits or not known[b]:
+                    alone.append(b)
+                    continue
+            joined[tracks] = True
+            numbers[regions + 1] = len(apart) + 1
+            apart.append((tracks, regions))
+        chosen = np.array(alone, np.int64)
+        found = [
+            Measurements(
+                centres=middles[chosen],
+                sizes=shown[chosen],
+                histograms=colour.histograms(bins, blobs.labels, chosen + 1, blobs.boxes[chosen]),
+                alone=np.ones(len(chosen), np.bool_),
+                sized=known[chosen],
+                shares=np.ones(len(chosen)),
+                joined=joined,
+            )
+        ]
+        owner = numbers[blobs.labels] if apart else blobs.labels
+        for number, (tracks, regions) in enumerate(apart):
+            x0, y0 = blobs.boxes[regions, :2].min(0)
+            x1, y1 = blobs.boxes[regions, 2:].max(0)
+            found.append(self._explain(owner, number + 1, bins, (x0, y0, x1, y1), expected, tracks, joined))
+        self._learn(blobs.labels, cores, np.array(samples, np.int64), chosen)
+        return _together(found, joined)
+
+    def _explain(
+        self,
+        owner: NDArray[np.int32],
+        number: int,
+        bins: NDArray[np.uint8],
+        box: tuple[float, float, float, float],
+        expected: Expected,
+        tracks: NDArray[np.int64],
+        joined: Flags,
+    ) -> Measurements:
+        """Explain a group of regions, within ``box``, by silhouettes."""
+        shape = self.silhouette.shape
+        centres, sizes = expected.centres[tracks].copy(), expected.sizes[tracks]
+        tables = _tell_apart(expected.references[tracks])
+        shares = silhouettes.place(shape, owner, number, bins, centres, sizes, tables, SWEEPS)
+        if self.sizes.known(np.array([0.5 * (box[1] + box[3])]))[0]:
+            lines = self.sizes.sizes(np.array([0.0, self._frame[1]]))
+            offsets, slopes = lines[0], (lines[1] - lines[0]) / self._frame[1]
+            window = self._window(box)
+            for _ in range(MOST_ADDED):
+                worth, x, y = silhouettes.unexplained(
+                    shape, owner, number, window, centres, sizes, offsets, slopes
+                )
+                if worth < LEAST_WORTH:
+                    break
+                centres = np.concatenate([centres, [[x, y]]])
+                sizes = np.concatenate([sizes, self.sizes.sizes(np.array([y]))])
+                tables = np.concatenate([tables, np.zeros((1, *tables.shape[1:]))])
+            if len(centres) > len(tracks):
+                shares = silhouettes.place(shape, owner, number, bins, centres, sizes, tables, SWEEPS)
+        histograms = silhouettes.colours(shape, owner, number, bins, centres, sizes, colour.BINS)
+        seen = shares >= LEAST_SEEN
+        return Measurements(
+            centres=centres[seen],
+            sizes=sizes[seen],
+            histograms=histograms[seen],
+            alone=np.zeros(int(seen.sum()), np.bool_),
+            sized=np.zeros(int(seen.sum()), np.bool_),
+            shares=shares[seen],
+            joined=joined,
+        )
+
+    def _window(self, box: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+        """Return where the centre of a rider may lie of a group within ``box``."""
+        x0, y0, x1, y1 = box
+        (w_top, h_top), (w_bottom, h_bottom) = self.sizes.sizes(np.array([y0, y1]))
+        w = min(w_top, w_bottom)
+        left = x0 + (0.35 * w if x0 > 0 else 0.0)
+        right = x1 - (0.35 * w if x1 < self._frame[0] else 0.0)
+        top = y0 + (0.35 * h_top if y0 > 0 else 0.0)
+        bottom = y1 - (0.35 * h_bottom if y1 < self._frame[1] else 0.0)
+        return left, top, max(left, right), max(top, bottom)
+
+    def _learn(
+        self,
+        labels: NDArray[np.int32],
+        cores: Floats,
+        samples: NDArray[np.int64],
+        alone: NDArray[np.int64],
+    ) -> None:
+        if not len(samples):
+            return
+        boxes = cores[samples]
+        self.sizes.learn(0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 2:] - boxes[:, :2])
+        for b in np.intersect1d(samples, alone):
+            x0, y0, x1, y1 = cores[b].astype(int)
+            self.silhouette.learn(labels[y0:y1, x0:x1] == b + 1)
+
+
+def _tell_apart(references: Floats) -> Floats:
+    """Return (K, 2, BINS) log likelihood ratios of colours: each rider's against the others'."""
+    if len(references) < 2:
+        return np.zeros(references.shape)
+    floor = 0.5 / colour.BINS
+    others = (references.sum(0) - references) / (len(references) - 1)
+    return np.asarray(np.clip(np.log((references + floor) / (others + floor)), -LIMIT, LIMIT))
+
+
+def _together(parts: list[Measurements], joined: Flags) -> Measurements:
+    return Measurements(
+        centres=np.concatenate([part.centres for part in parts]),
+        sizes=np.concatenate([part.sizes for part in parts]),
+        histograms=np.concatenate([part.histograms for part in parts]),
+        alone=np.concatenate([part.alone for part in parts]),
+        sized=np.concatenate([part.sized for part in parts]),
+        shares=np.concatenate([part.shares for part in parts]),
+        joined=joined,
+    )

@@ -1,0 +1,122 @@
+"""Cast shadows in the foreground: the road, only darker, and all shadows of a scene about equally dark.
+
+What a shadow falls on keeps its texture and nearly its colour: over a small window the ratio to the
+background image hardly varies (Jacques, Jung, Musse, Background subtraction and shadow detection in grayscale
+video sequences, SIBGRAPI 2005). Dark clothes may do the same; but the shadows of all riders share one
+darkness, which is learnt as the mode of what looks like one.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+REACH = 1
+"""Half side of the window, px."""
+DARKEST, BRIGHTEST = 0.3, 0.95
+"""Ratios to the background image that a shadow may have."""
+BLUEST, REDDEST = 0.35, -0.1
+"""Tints that a shadow may have: ratio of blue minus that of red, over their mean. Its light is the sky's."""
+GREENEST = 0.08
+"""How far green may lie from the middle of red and blue, over the mean."""
+UNEVEN = 0.12
+"""Greatest relative standard deviation of the ratio in the window."""
+BINS = (26, 18)
+"""Of the histogram of darkness and tint."""
+EDGE = 7
+"""Side of the neighbourhood, px, in which a shadow may be uneven."""
+FADING = 0.98
+DARKER, OFF_TINT = 0.2, 0.12
+"""How much darker than the mode a shadow may be, and how far off its tint; what is brighter is its rim."""
+
+
+@njit(cache=True)
+def darkness(image, background, mask):  # type: ignore[no-untyped-def]
+    """Tell by how much each foreground pixel is the road darkened.
+
+    Args:
+        image: (H, W, 3) uint8.
+        background: (H, W, 3) uint8.
+        mask: (H, W) bool, foreground.
+
+    Returns:
+        (H, W, 3) float32: the ratio to the background, 0 where it is no shadow's; its tint; and its relative
+        standard deviation in the window.
+    """
+    height, width = mask.shape
+    found = np.zeros((height, width, 3), np.float32)
+    for y in range(height):
+        for x in range(width):
+            if not mask[y, x]:
+                continue
+            count, first, second = 0, 0.0, 0.0
+            now0, now1, now2, then0, then1, then2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for v in range(max(y - REACH, 0), min(y + REACH + 1, height)):
+                for u in range(max(x - REACH, 0), min(x + REACH + 1, width)):
+                    if not mask[v, u]:
+                        continue
+                    a0, a1, a2 = float(image[v, u, 0]), float(image[v, u, 1]), float(image[v, u, 2])
+                    b0, b1, b2 = (
+                        float(background[v, u, 0]),
+                        float(background[v, u, 1]),
+                        float(background[v, u, 2]),
+                    )
+                    now0, now1, now2 = now0 + a0, now1 + a1, now2 + a2
+                    then0, then1, then2 = then0 + b0, then1 + b1, then2 + b2
+                    ratio = (a0 + a1 + a2 + 3.0) / (b0 + b1 + b2 + 3.0)
+                    first += ratio
+                    second += ratio * ratio
+                    count += 1
+            mean = (now0 + now1 + now2) / (then0 + then1 + then2 + 1.0)
+            if mean < DARKEST or mean > BRIGHTEST:
+                continue
+            red, green, blue = now0 / (then0 + 1.0), now1 / (then1 + 1.0), now2 / (then2 + 1.0)
+            tint = (blue - red) / mean
+            first /= count
+            spread = np.sqrt(max(second / count - first * first, 0.0)) / mean
+            if REDDEST < tint < BLUEST and abs(green - 0.5 * (red + blue)) <= GREENEST * mean:
+                found[y, x] = mean, tint, spread
+    return found
+
+
+class Shadows:
+    """Takes the cast shadows of one scene out of its foreground."""
+
+    def __init__(self) -> None:
+        self._counts = np.zeros(BINS)
+
+    def remove(
+        self, image: NDArray[np.uint8], background: NDArray[np.uint8], mask: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Return (H, W) the foreground without shadows, and learn how dark these are.
+
+        Args:
+            image: (H, W, 3) RGB.
+            background: (H, W, 3) RGB, the background image.
+            mask: (H, W) raw foreground.
+        """
+        at = np.nonzero(mask)
+        ratios, tints, spread = darkness(image, background, mask)[at].T
+        likely = (ratios > 0.0) & (spread < UNEVEN)
+        counts, dark_edges, tint_edges = np.histogram2d(
+            ratios[likely], tints[likely], BINS, ((DARKEST, BRIGHTEST), (REDDEST, BLUEST))
+        )
+        self._counts = FADING * self._counts + counts
+        if not self._counts.any():
+            return mask
+        smooth = cv2.blur(self._counts, (3, 3), borderType=cv2.BORDER_CONSTANT)
+        i, j = np.unravel_index(smooth.argmax(), smooth.shape)
+        dark = 0.5 * (dark_edges[i] + dark_edges[i + 1])
+        tint = 0.5 * (tint_edges[j] + tint_edges[j + 1])
+        # A rim has less of both: a part of the sun still shines there.
+        expected = tint * (1.0 - ratios) / (1.0 - dark)
+        dim = (ratios > dark - DARKER) & (np.abs(tints - expected) < OFF_TINT)
+        sure = np.zeros(mask.shape, np.uint8)
+        sure[at] = dim & likely
+        # At its edges the window reaches beyond a shadow.
+        near = cv2.dilate(sure, np.ones((EDGE, EDGE), np.uint8))
+        left = mask.copy()
+        left[at] = ~(dim & (near[at] > 0))
+        return left

@@ -1,0 +1,96 @@
+"""The motorcycle-lane tracker: paper 3's idea with its limits mended (registry name ``motorcycle-lane``).
+
+A statistical background model gives the foreground; its regions give a measurement of each rider, also where
+riders touch or hide one another; joint probabilistic data association follows them, each with a probability
+that it exists.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.motorcycle_lane.background import BackgroundModel
+from tracker.motorcycle_lane.flow import Flow
+from tracker.motorcycle_lane.front_end import look
+from tracker.motorcycle_lane.measuring import Measurer
+from tracker.motorcycle_lane.shadows import Shadows
+from tracker.motorcycle_lane.tracks import TrackStore
+from tracker.types import Diagnostics, Frame, Info, Predictions, Status, Tracks
+
+# Of the filter's state (x, vx, y, vy) the order that is shown: cx, cy, vx, vy.
+SHOWN = np.array([0, 2, 1, 3])
+
+
+class MotorcycleLaneTracker:
+    """Follows the riders of a lane before a static camera."""
+
+    def __init__(self) -> None:
+        """Build the tracker; `start` begins an episode."""
+        self._diagnostics = Diagnostics()
+
+    def start(self, info: Info) -> None:
+        """Forget everything and get ready for an episode."""
+        self._info = info
+        self._background = BackgroundModel(info.width, info.height)
+        self._shadows = Shadows()
+        self._measurer = Measurer(info.width, info.height)
+        self._store = TrackStore(info.width, info.height, info.rate)
+        self._flow = Flow(info.width, info.height, info.rate)
+        self._diagnostics = Diagnostics()
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """Mask, measurements, predictions and flags of the last frame."""
+        return self._diagnostics
+
+    @property
+    def background(self) -> BackgroundModel:
+        """The background model of the episode."""
+        return self._background
+
+    @property
+    def store(self) -> TrackStore:
+        """The tracks, with their association probabilities."""
+        return self._store
+
+    def step(self, frame: Frame) -> Tracks:
+        """Return the tracks of this frame; what was returned is final."""
+        store = self._store
+        sight = look(frame.image, self._foreground(frame.image))
+        store.predict(self._measurer.sizes)
+        tracks = store.tracks
+        predictions = Predictions(
+            ids=tracks.ids, centres=tracks.centres.copy(), covariances=tracks.covariance[:, ::2, ::2].copy()
+        )
+        at, expected = store.expected()
+        seen = self._measurer.measure(sight, expected)
+        joined = np.zeros(len(tracks), np.bool_)
+        joined[at] = seen.joined
+        store.update(seen, joined)
+        tracks = store.tracks
+        status = store.status()
+        gone = (status == Status.CONFIRMED) & tracks.moved(1.0)
+        flags = self._flow.step(
+            tracks.ids[gone], tracks.centres[gone], tracks.velocities[gone], tracks.sizes[gone, 1]
+        )
+        self._diagnostics = Diagnostics(
+            detections=self._clip(seen.boxes), mask=sight.mask, predictions=predictions, flags=flags
+        )
+        return Tracks(
+            ids=tracks.ids.copy(),
+            boxes=self._clip(tracks.boxes),
+            status=status,
+            score=tracks.existence.copy(),
+            state=tracks.mean[:, SHOWN],
+            covariance=tracks.covariance[:, SHOWN[:, None], SHOWN],
+        )
+
+    def _foreground(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Return (H, W) what is neither background nor a shadow on it."""
+        raw = self._background.apply(image)
+        return self._shadows.remove(image, self._background.background, raw)
+
+    def _clip(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+        limits = np.array([self._info.width, self._info.height] * 2, float)
+        return np.clip(boxes, 0.0, limits)
