@@ -44,17 +44,23 @@ def trees() -> Trees:
 
 @njit(cache=True)
 def _sum(found, roots, cues, limits, rights):  # type: ignore[no-untyped-def]
-    result = np.zeros(found.shape[0])
-    for i in range(found.shape[0]):
-        total = 0.0
-        for k in range(roots.size):
-            if k == FIRST and total < HOPELESS:
-                break
+    count = found.shape[0]
+    result = np.zeros(count)
+    alive, number = np.arange(count), count
+    # Tree by tree, since a tree stays in the fastest memory while all outlines go down it.
+    for k in range(roots.size):
+        if k == FIRST:
+            number = 0
+            for i in range(count):
+                if result[i] >= HOPELESS:
+                    alive[number] = i
+                    number += 1
+        for place in range(number):
+            i = alive[place]
             node = roots[k]
             while cues[node] >= 0:
                 node = node + 1 if found[i, cues[node]] <= limits[node] else rights[node]
-            total += limits[node]
-        result[i] = total
+            result[i] += limits[node]
     return result
 
 
