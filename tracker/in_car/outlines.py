@@ -237,7 +237,8 @@ def outlines(relief: Relief, likely: Floats, farthest: float) -> Floats:
 
 def _best(pairs: Floats, most: int) -> Floats:
     """Return the most promising of (K, 5) in each row: far vehicles promise less than near ones."""
-    pairs = pairs[np.lexsort((-pairs[:, 3], pairs[:, 4]))]
+    # By row, then by promise, which lies below 100.
+    pairs = pairs[np.argsort(100.0 * pairs[:, 4] - pairs[:, 3], kind="stable")]
     first = np.searchsorted(pairs[:, 4], pairs[:, 4])
     best: Floats = pairs[np.arange(len(pairs)) - first < most]
     return best

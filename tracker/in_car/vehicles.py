@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tracker.in_car.cues import BODY_PLAY, BODY_SHARE, cues
@@ -365,6 +366,7 @@ def _redness(relief: Relief, column: NDArray[np.int64], row: NDArray[np.int64], 
     return np.asarray(total / ((x1 - x0) * (y1 - y0)))
 
 
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def covered(box: Floats, other: Floats) -> float:
     """Return the shared area over the smaller box's area."""
     wide = min(box[2], other[2]) - max(box[0], other[0])
@@ -372,4 +374,5 @@ def covered(box: Floats, other: Floats) -> float:
     if wide <= 0 or tall <= 0:
         return 0.0
     smaller = min((box[2] - box[0]) * (box[3] - box[1]), (other[2] - other[0]) * (other[3] - other[1]))
-    return float(wide * tall / max(smaller, 1e-9))
+    share: float = wide * tall / max(smaller, 1e-9)
+    return share
