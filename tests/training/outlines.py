@@ -1,8 +1,9 @@
 """Learns the trees of `tracker.in_car.outline_odds` from simulated drives.
 
 ``python -m tests.training.outlines`` drives every in-car scenario over seeds that no validation uses, lets
-the tracker look, compares the outlines that it weighs with the truth, and writes the trees. Among what it
-learns from are the present trees' mistakes. It needs ``pip install 'testtrack[training]'``.
+the tracker look, compares the outlines that it weighs with the truth, and writes the trees. It begins
+without any trees and goes over the drives again with those that it has learnt, to learn from their
+mistakes: nothing of the present trees enters. It needs ``pip install 'testtrack[training]'``.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -43,9 +45,11 @@ EVERY = 6
 """Frames from one sample to the next: neighbours are alike."""
 RIGHT, WRONG = 0.7, 0.45
 """Overlap with a scored vehicle from which an outline is right, and below which it is wrong."""
+GENERATIONS = 3
+"""How often the drives are gone over. What earlier trees got wrong is kept: it is the more diverse."""
 KEPT = 20
 """Outlines of a frame that are learnt from at most: of each, right ones, wrong ones, wrong ones that stand on
-another vehicle (parked, oncoming), and wrong ones that the present tables take for right."""
+another vehicle (parked, oncoming), and the wrong ones that the last trees found likeliest."""
 TREES, LEAVES, RATE = 200, 32, 0.1
 """How many trees, of how many leaves, and how much of each step is taken."""
 RISING = {
@@ -58,6 +62,15 @@ FALLING = {
 }  # fmt: skip
 """Cues of which more never speaks against a vehicle, or never for one: what simulated drives teach beyond
 that does not hold on real ones."""
+
+
+NONE = Trees(
+    roots=np.zeros(0, np.int32),
+    cues=np.zeros(0, np.int16),
+    limits=np.zeros(0, np.float32),
+    rights=np.zeros(0, np.int32),
+)
+"""By these every outline's odds are even, and no vehicle is begun."""
 
 
 def drive(name: str, seed: int) -> Scenario:
@@ -89,13 +102,13 @@ def drive(name: str, seed: int) -> Scenario:
     return spec.load(f"in-car-{name}", [f"{key}={value}" for key, value in changes.items()])
 
 
-def samples(scenario: str, seed: int) -> tuple[Floats, NDArray[np.bool_]]:
-    """Drive once: cues (N, C) of outlines, and whether each is a vehicle's (N,)."""
-    drawn = np.random.default_rng(seed)
+def samples(scenario: str, seed: int, trees: Trees) -> tuple[Floats, NDArray[np.bool_]]:
+    """Drive once with the last trees: cues (N, C) of outlines, and whether each is a vehicle's (N,)."""
+    drawn = np.random.default_rng((seed, len(trees.roots)))
     # Farther ones than are scored, too: they are seen before they are near.
     scored_by = ScoringParams(max_distance=100.0, min_height=9.0)
     cues, right = [], []
-    watched = InCarTracker()
+    watched = InCarTracker(trees)
 
     def look(observation: Observation, _: Mapping[str, tuple[Tracks, Diagnostics]]) -> None:
         sighting = watched.sighting
@@ -111,7 +124,7 @@ def samples(scenario: str, seed: int) -> tuple[Floats, NDArray[np.bool_]]:
         overlap = _greatest(chosen.boxes[chosen.scored], boxes)
         wrong = (overlap < WRONG) & (_greatest(chosen.boxes[unclear], boxes) < 0.3)
         found = np.flatnonzero(overlap > RIGHT)
-        missed = np.flatnonzero(wrong)
+        missed = drawn.permutation(np.flatnonzero(wrong))
         parked = np.flatnonzero(wrong & (_greatest(others, boxes) > WRONG))
         mistaken = missed[np.argsort(-sighting.odds[missed], kind="stable")[:KEPT]]
         for index in (found, missed, parked, mistaken):
@@ -183,14 +196,17 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     arguments = parser.parse_args()
     drives = [(name, FIRST_SEED + k) for k in range(arguments.drives) for name in SCENARIOS]
-    with ProcessPoolExecutor(arguments.jobs, mp_context=get_context("spawn")) as pool:
-        found = []
-        for drive, sample in zip(drives, pool.map(samples, *zip(*drives, strict=True)), strict=True):
-            print(*drive, len(sample[1]), flush=True)
-            found.append(sample)
-    fitted = fit(np.concatenate([f[0] for f in found]), np.concatenate([f[1] for f in found]))
+    trees = NONE
+    found: list[tuple[Floats, NDArray[np.bool_]]] = []
+    for generation in range(GENERATIONS):
+        with ProcessPoolExecutor(arguments.jobs, mp_context=get_context("spawn")) as pool:
+            looked = pool.map(samples, *zip(*drives, strict=True), repeat(trees))
+            for drive, sample in zip(drives, looked, strict=True):
+                print(generation, *drive, len(sample[1]), flush=True)
+                found.append(sample)
+        trees = fit(np.concatenate([f[0] for f in found]), np.concatenate([f[1] for f in found]))
     with moved_in(WRITTEN) as path, path.open("wb") as file:
-        np.savez_compressed(file, **fitted._asdict())
+        np.savez_compressed(file, **trees._asdict())
     print(f"Written: {WRITTEN}")
 
 
