@@ -115,6 +115,8 @@ class SensorParams(Params):
     """Standard deviation at mid grey, of 255."""
     blur: NonNegative = 0.6
     """Lens blur, standard deviation, px."""
+    sharpening: NonNegative = 0.8
+    """By the camera's own processing: share of the difference from a blurred picture that is added."""
     vignetting: Fraction = 0.25
     """Loss of light in the corners."""
     exposure_lag: NonNegative = 0.5
