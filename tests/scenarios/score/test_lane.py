@@ -38,7 +38,16 @@ def test_what_was_never_shown_is_null():
     assert scores["recovery_s"] is None
     assert "identification" not in scores
     assert difficulty["riders_in_view"] == {"mean": 1.0, "most": 1.0}
+    assert difficulty["partly_hidden"] == 0.0
     assert "traces" not in difficulty
+
+
+def test_riders_behind_others_are_partly_hidden_and_those_at_the_border_are_not():
+    behind = rider(1, AWAY, visible=0.6)
+    cut_off = rider(2, (0, 100, 40, 140), visible=0.6, in_frame=0.6)
+    difficulty = lane([[rider(), behind, cut_off]] * 12)[1]
+    assert difficulty["riders_in_view"]["mean"] == 3.0
+    assert difficulty["partly_hidden"] == pytest.approx(1 / 3)
 
 
 def test_training_frames_are_not_scored():
