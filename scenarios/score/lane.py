@@ -43,9 +43,7 @@ def lane_scores(log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringPara
     return scores
 
 
-def detection(
-    log: EpisodeLog, frames: Sequence[ScoredFrame], params: ScoringParams
-) -> dict[str, Any]:
+def detection(log: EpisodeLog, frames: Sequence[ScoredFrame], params: ScoringParams) -> dict[str, Any]:
     """Count detections; precision and recall are None where there is nothing to divide by."""
     names = ("precision", "recall", "riders", "correct", "false", "missed")
     if log.shown.detections is None:
