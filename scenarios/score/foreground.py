@@ -16,9 +16,17 @@ from sim.truth.standing import Standing
 
 def foreground_f(log: EpisodeLog, frames: Sequence[ScoredFrame], params: ScoringParams) -> float | None:
     """Give the F measure of all masks; shadows are background, what has long stood does not count."""
+    hits, marked, wanted = total_counts(log, frames, params)
+    return 2 * hits / (marked + wanted) if marked + wanted else None
+
+
+def total_counts(
+    log: EpisodeLog, frames: Sequence[ScoredFrame], params: ScoringParams
+) -> tuple[int, int, int]:
+    """Sum `mask_counts` over frames."""
     counts = [found for frame in frames if (found := mask_counts(log, frame, params)) is not None]
     hits, marked, wanted = np.array(counts, np.int64).reshape(-1, 3).sum(axis=0).tolist()
-    return 2 * hits / (marked + wanted) if marked + wanted else None
+    return hits, marked, wanted
 
 
 def mask_counts(log: EpisodeLog, frame: ScoredFrame, params: ScoringParams) -> tuple[int, int, int] | None:
