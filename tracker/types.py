@@ -145,7 +145,7 @@ class Association:
 
     Attributes:
         ids: (N,) int64, of the tracks that the frame began with.
-        beta: (N, M + 1) float64: that the track was missed, then that each detection is its own; rows sum to 1.
+        beta: (N, M + 1) float64: that it was missed, then that each detection is its own; rows sum to 1.
     """
 
     ids: NDArray[np.int64]

@@ -33,7 +33,7 @@ TRAFFIC = {
     20: (7.5, 5.5),
     32: (6.5, 6.0),
     48: (5.0, 7.0),
-    80: (3.0, 7.8),
+    72: (3.2, 7.6),
 }
 """Riders between entry and far end: their speed, m/s, and the lane's width, m. A lane at full speed holds no
 more than 17 in view, so it gets slower and wider; all else stays as it is."""
@@ -111,7 +111,7 @@ def draw(rows: Sequence[dict[str, Any]], directory: Path) -> None:
         axes.set(xlabel="riders in view, mean", title=label, ylim=(0, 1.02), xlim=(0, None))
         axes.grid(color="#d9dde4", linewidth=0.5)
         axes.spines[["top", "right"]].set_visible(False)
-    panels[0].legend(frameon=False, loc="lower left", fontsize=8.5)
+    panels[0].legend(frameon=False, loc="upper right", fontsize=8.5)
     for suffix in ("svg", "png"):
         figure.savefig(directory / f"riders_in_view.{suffix}", dpi=160)
 
