@@ -31,8 +31,8 @@ LEAST_WORTH = 0.45
 LEAST_SEEN = 0.25
 """Smallest share of a silhouette that must be seen to measure where it is."""
 MOST_ADDED = 4
-CORE = 0.25
-"""Least share of a box that a row or column of a region's core fills."""
+CORE, FEET = 0.12, 0.3
+"""Least share of a box that a row or column of a region's core fills; share of its height where shadows lie."""
 LIMIT = 1.5
 """Log likelihood ratios of a pixel's colour lie between this and its negative."""
 SWEEPS = 2
@@ -103,7 +103,8 @@ def count_inside(labels, boxes, regions):  # type: ignore[no-untyped-def]
 def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
     """Return the boxes (N, 4) of labelled regions without what sticks out: rests of shadows, and specks.
 
-    A column belongs to the core if it holds `CORE` of the box's height or more, and a row likewise.
+    A column belongs to the core if it holds `CORE` of the box's height or more above the feet: a shadow lies
+    on the road, so that beside a rider it is low. A row belongs to it if it holds as much of those columns.
 
     Args:
         labels: (H, W) int32, region k has k + 1.
@@ -113,15 +114,20 @@ def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
     for k in range(boxes.shape[0]):
         x0, y0, x1, y1 = int(boxes[k, 0]), int(boxes[k, 1]), int(boxes[k, 2]), int(boxes[k, 3])
         columns, rows = np.zeros(x1 - x0), np.zeros(y1 - y0)
-        for y in range(y0, y1):
+        for y in range(y0, int(np.ceil(y1 - FEET * (y1 - y0)))):
             for x in range(x0, x1):
                 if labels[y, x] == k + 1:
                     columns[x - x0] += 1.0
+        wide = np.flatnonzero(columns >= CORE * (y1 - y0))
+        if not wide.size:
+            continue
+        left, right = x0 + wide[0], x0 + wide[-1] + 1
+        for y in range(y0, y1):
+            for x in range(left, right):
+                if labels[y, x] == k + 1:
                     rows[y - y0] += 1.0
-        wide, tall = np.flatnonzero(columns >= CORE * (y1 - y0)), np.flatnonzero(rows >= CORE * (x1 - x0))
-        if wide.size and tall.size:
-            found[k, 0], found[k, 2] = x0 + wide[0], x0 + wide[-1] + 1
-            found[k, 1], found[k, 3] = y0 + tall[0], y0 + tall[-1] + 1
+        tall = np.flatnonzero(rows >= CORE * (right - left))
+        found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, y0 + tall[0], right, y0 + tall[-1] + 1
     return found
 
 
