@@ -33,6 +33,10 @@ LEAST_SEEN = 0.25
 MOST_ADDED = 4
 CORE, FEET = 0.12, 0.3
 """Least share of a box that a row or column of a region's core fills; share of its height where shadows lie."""
+EATEN = 0.75
+"""What the median filter takes off each end of a rider, px."""
+TRAINING = 30
+"""Frames in which the background is not yet known, nor then what is a rider."""
 LIMIT = 1.5
 """Log likelihood ratios of a pixel's colour lie between this and its negative."""
 SWEEPS = 2
@@ -138,6 +142,7 @@ class Measurer:
         self.sizes = SizeModel(width, height)
         self.silhouette = Silhouette()
         self._frame = np.array([width, height], float)
+        self._frames = 0
 
     def measure(self, sight: Sight, expected: Expected) -> Measurements:
         """Return what is seen, given what is expected."""
@@ -157,7 +162,7 @@ class Measurer:
         ]
         groups += [(np.zeros(0, np.int64), np.array([b])) for b in np.flatnonzero(of_blob < 0)]
         cores = core_boxes(blobs.labels, blobs.boxes)
-        shown = cores[:, 2:] - cores[:, :2]
+        shown = cores[:, 2:] - cores[:, :2] + 2.0 * EATEN
         middles = 0.5 * (cores[:, :2] + cores[:, 2:])
         known = self.sizes.known(middles[:, 1])
         usual = self.sizes.sizes(middles[:, 1])
@@ -201,7 +206,9 @@ class Measurer:
             x0, y0 = blobs.boxes[regions, :2].min(0)
             x1, y1 = blobs.boxes[regions, 2:].max(0)
             found.append(self._explain(owner, number + 1, bins, (x0, y0, x1, y1), expected, tracks, joined))
-        self._learn(blobs.labels, cores, np.array(samples, np.int64), chosen)
+        if self._frames >= TRAINING:
+            self._learn(blobs.labels, cores, np.array(samples, np.int64), chosen)
+        self._frames += 1
         return _together(found, joined)
 
     def _explain(
@@ -267,7 +274,7 @@ class Measurer:
         if not len(samples):
             return
         boxes = cores[samples]
-        self.sizes.learn(0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 2:] - boxes[:, :2])
+        self.sizes.learn(0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 2:] - boxes[:, :2] + 2.0 * EATEN)
         for b in np.intersect1d(samples, alone):
             x0, y0, x1, y1 = cores[b].astype(int)
             self.silhouette.learn(labels[y0:y1, x0:x1] == b + 1)
