@@ -24,7 +24,7 @@ Flags = NDArray[np.bool_]
 
 TOO_LARGE = 1.4
 """A region so many times as wide or as high as a rider holds more than one, or one and something else."""
-TOO_SMALL = 0.06
+TOO_SMALL = 0.25
 """A region of a smaller share of a rider's box, not at the border, is no rider."""
 LEAST_WORTH = 0.45
 """How well a silhouette that no track expects must explain foreground."""
@@ -40,6 +40,8 @@ TRAINING = 30
 LIMIT = 1.5
 """Log likelihood ratios of a pixel's colour lie between this and its negative."""
 SWEEPS = 2
+ROUNDS = 2
+"""Of guessing a rider's size by its row, and the row of its middle, beyond the border, by its size."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,6 +137,27 @@ def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
     return found
 
 
+def complete(visible: Floats, touches: Flags, sizes: Floats) -> Floats:
+    """Return the whole boxes (N, 4) of riders that the picture's border cuts off.
+
+    Args:
+        visible: (N, 4) what is seen of them.
+        touches: (N, 4) whether that touches the left, upper, right and lower border.
+        sizes: (N, 2) how large they are.
+    """
+    whole = visible.copy()
+    for axis in range(2):
+        low, high = touches[:, axis], touches[:, axis + 2]
+        size = sizes[:, axis]
+        # One that is cut off across may show too little of its breadth; it goes to both sides.
+        across = touches[:, 1 - axis] | touches[:, 3 - axis]
+        lacking = np.maximum(size - (visible[:, axis + 2] - visible[:, axis]), 0.0)
+        both = np.where((low == high) & across, 0.5, 0.0)
+        whole[:, axis] -= lacking * np.where(low & ~high, 1.0, both)
+        whole[:, axis + 2] += lacking * np.where(high & ~low, 1.0, both)
+    return whole
+
+
 class Measurer:
     """Measures riders, and learns from those alone how large they are and what shape they have."""
 
@@ -154,7 +177,8 @@ class Measurer:
         linked = inside >= 0.2 * (expected.sizes.prod(1))[:, None]
         linked |= (inside >= 0.5 * blobs.areas) & (blobs.areas > 0)
         of_track, of_blob = components(linked)
-        at_border = np.asarray((blobs.boxes[:, :2] <= 0).any(1) | (blobs.boxes[:, 2:] >= self._frame).any(1))
+        touches = np.concatenate([blobs.boxes[:, :2] <= 0, blobs.boxes[:, 2:] >= self._frame], 1)
+        at_border = np.asarray(touches.any(1))
         # Tracks of a group, and its regions; regions that nobody expects are groups of their own.
         groups = [
             (np.flatnonzero(of_track == k), np.flatnonzero(of_blob == k))
@@ -162,10 +186,12 @@ class Measurer:
         ]
         groups += [(np.zeros(0, np.int64), np.array([b])) for b in np.flatnonzero(of_blob < 0)]
         cores = core_boxes(blobs.labels, blobs.boxes)
-        shown = cores[:, 2:] - cores[:, :2] + 2.0 * EATEN
-        middles = 0.5 * (cores[:, :2] + cores[:, 2:])
-        known = self.sizes.known(middles[:, 1])
-        usual = self.sizes.sizes(middles[:, 1])
+        visible = cores + EATEN * np.array([-1.0, -1.0, 1.0, 1.0])
+        known = self.sizes.known(0.5 * (cores[:, 1] + cores[:, 3]))
+        whole = visible
+        for _ in range(ROUNDS):
+            usual = self.sizes.sizes(0.5 * (whole[:, 1] + whole[:, 3]))
+            whole = complete(visible, touches & known[:, None], usual)
         numbers = np.zeros(len(blobs) + 1, np.int32)
         joined = np.zeros(len(expected.centres), np.bool_)
         alone: list[int] = []
@@ -180,9 +206,11 @@ class Measurer:
                 continue
             if len(tracks) < 2 and len(regions) == 1:
                 size = expected.sizes[tracks[0]] if len(tracks) else usual[b]
-                part = len(tracks) > 0 or at_border[b]
-                fits = (shown[b] <= TOO_LARGE * size).all()
-                fits &= not part or (shown[b] >= size / TOO_LARGE).all()
+                if len(tracks) and at_border[b]:
+                    whole[b] = complete(visible[b : b + 1], touches[b : b + 1], size[None])[0]
+                shown = whole[b, 2:] - whole[b, :2]
+                fits = (shown <= TOO_LARGE * size).all()
+                fits &= len(tracks) == 0 or (shown >= size / TOO_LARGE).all()
                 if fits or not known[b]:
                     alone.append(b)
                     continue
@@ -192,11 +220,11 @@ class Measurer:
         chosen = np.array(alone, np.int64)
         found = [
             Measurements(
-                centres=middles[chosen],
-                sizes=shown[chosen],
+                centres=0.5 * (whole[chosen, :2] + whole[chosen, 2:]),
+                sizes=whole[chosen, 2:] - whole[chosen, :2],
                 histograms=colour.histograms(bins, blobs.labels, chosen + 1, blobs.boxes[chosen]),
-                alone=np.ones(len(chosen), np.bool_),
-                sized=known[chosen],
+                alone=~at_border[chosen],
+                sized=known[chosen] & ~at_border[chosen],
                 shares=np.ones(len(chosen)),
                 joined=joined,
             )

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 CAPACITY = 600
 """Samples that are kept: the newest."""
 ENOUGH = 30
-BEYOND = 0.15
+BEYOND = 0.4
 """How far beyond the rows that were sampled the line holds, as a share of the picture's height."""
 TOLERANCE = 0.25
 """Relative deviation at which a sample loses its say."""
