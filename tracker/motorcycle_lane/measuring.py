@@ -32,7 +32,7 @@ LEAST_SEEN = 0.25
 """Smallest share of a silhouette that must be seen to measure where it is."""
 MOST_ADDED = 4
 CORE, FEET = 0.12, 0.3
-"""Least share of a box that a row or column of a region's core fills; share of its height where shadows lie."""
+"""Least share of a box that a row or column of a region's core fills; lowest share, where shadows lie."""
 EATEN = 0.75
 """What the median filter takes off each end of a rider, px."""
 TRAINING = 30
@@ -133,6 +133,8 @@ def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
                 if labels[y, x] == k + 1:
                     rows[y - y0] += 1.0
         tall = np.flatnonzero(rows >= CORE * (right - left))
+        if not tall.size:
+            continue
         found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, y0 + tall[0], right, y0 + tall[-1] + 1
     return found
 

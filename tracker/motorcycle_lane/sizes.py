@@ -31,7 +31,7 @@ VOTE = 0.08
 SMOOTHING = 1.8
 """By so many bins the sizes of single riders differ."""
 ASPECT, ASPECT_SPREAD = 0.45, 0.35
-"""Width of a machine with its rider over their height, seen from the front or back; and how far that is sure."""
+"""Width of a machine with its rider over their height, from front or back; and its logarithm's spread."""
 # By so many samples about the voted lines each fitted one is held.
 _HELD = np.diag([3.0, 3.0])
 

@@ -245,7 +245,9 @@ class TrackStore:
         hit = beta[:, 0] < 0.5
         t.hits = t.hits + hit
         t.misses = np.where(hit, 0, t.misses + 1)
-        t.confirmed = t.confirmed | ((t.existence > CONFIRMED) & (t.hits >= CONFIRMING_HITS) & t.moved(t.asked))
+        t.confirmed = t.confirmed | (
+            (t.existence > CONFIRMED) & (t.hits >= CONFIRMING_HITS) & t.moved(t.asked)
+        )
         still = np.hypot(*t.velocities.T) < STILL * t.sizes[:, 1]
         t.stood = np.where(still, t.stood + 1, 0)
         self._learn(seen, beta)
