@@ -11,38 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.motorcycle_lane.background import BackgroundModel
+from tracker.motorcycle_lane.episode import EpisodeTracker
 from tracker.motorcycle_lane.flow import Flow
 from tracker.motorcycle_lane.front_end import look
 from tracker.motorcycle_lane.measuring import Measurer
 from tracker.motorcycle_lane.shadows import Shadows
 from tracker.motorcycle_lane.tracks import TrackStore
-from tracker.types import Association, Diagnostics, Frame, Info, Predictions, Status, Tracks
+from tracker.types import Association, Diagnostics, Frame, Predictions, Status, Tracks
 
 # Of the filter's state (x, vx, y, vy) the order that is shown: cx, cy, vx, vy.
 SHOWN = np.array([0, 2, 1, 3])
 
 
-class MotorcycleLaneTracker:
+class MotorcycleLaneTracker(EpisodeTracker):
     """Follows the riders of a lane before a static camera."""
 
-    def __init__(self) -> None:
-        """Build the tracker; `start` begins an episode."""
-        self._diagnostics = Diagnostics()
-
-    def start(self, info: Info) -> None:
-        """Forget everything and get ready for an episode."""
-        self._info = info
-        self._background = BackgroundModel(info.width, info.height)
+    def _begin(self) -> None:
+        self._background = BackgroundModel(self._info.width, self._info.height)
         self._shadows = Shadows()
-        self._measurer = Measurer(info.width, info.height)
-        self._store = TrackStore(info.width, info.height, info.rate)
-        self._flow = Flow(info.width, info.height, info.rate)
-        self._diagnostics = Diagnostics()
-
-    @property
-    def diagnostics(self) -> Diagnostics:
-        """Mask, measurements, predictions and flags of the last frame."""
-        return self._diagnostics
+        self._measurer = Measurer(self._info.width, self._info.height)
+        self._store = TrackStore(self._info.width, self._info.height, self._info.rate)
+        self._flow = Flow(self._info.width, self._info.height, self._info.rate)
 
     @property
     def background(self) -> BackgroundModel:
