@@ -76,7 +76,10 @@ def plain_unexplained(shape, groups, window, centres, sizes, offsets, slopes):
     for y, x in itertools.product(np.arange(y0, y1 + 1e-9, step), np.arange(x0, x1 + 1e-9, step)):
         centre, size = np.array([x, y]), np.maximum(offsets + slopes * y, 4.0)
         stride = 3 if size[0] >= 18 else 2
-        (left, top), (right, bottom) = (centre - 0.5 * size).astype(int), (centre + 0.5 * size).astype(int) + 1
+        (left, top), (right, bottom) = (
+            (centre - 0.5 * size).astype(int),
+            (centre + 0.5 * size).astype(int) + 1,
+        )
         total = value = 0.0
         for v, u in itertools.product(range(top, bottom, stride), range(left, right, stride)):
             covered = covers(shape, v, u, centre, size)
