@@ -1,4 +1,4 @@
-"""Placing silhouettes, and looking for one more, against the same said plainly: pixel by pixel, no windows."""
+"""Placing silhouettes, and looking for one more, against the same said plainly, pixel by pixel."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def plain_place(scene, expected, sizes, sweeps):
         while step >= 1.0:
             origin, better = centres[k].copy(), False
             for down, across in itertools.product((-step, 0, step), repeat=2):
-                trial = origin + (across, down)
+                trial = origin + np.array([across, down])
                 if np.abs(trial - start).max() > reach:
                     continue
                 pull = PULL * (((trial - expected[k]) / sizes[k]) ** 2).sum()
