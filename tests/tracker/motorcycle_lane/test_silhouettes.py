@@ -24,10 +24,9 @@ def pixels(place, size, stride):
     return itertools.product(range(int(top), int(bottom), stride), range(int(left), int(right), stride))
 
 
-def plain_worth(scene, centres, sizes, k, place, *, stride, shown_only=False):
+def plain_worth(scene, centres, sizes, k, place, *, stride, nearer, shown_only=False):
     """The mean worth of silhouette k's pixels if it stands at ``place`` and the others at ``centres``."""
     shape, groups, bins, tables = scene
-    feet = centres[:, 1] + 0.5 * sizes[:, 1]
     total = value = 0.0
     for y, x in pixels(place, sizes[k], stride):
         covered = covers(shape, y, x, place, sizes[k])
@@ -38,11 +37,16 @@ def plain_worth(scene, centres, sizes, k, place, *, stride, shown_only=False):
             value -= 0.0 if shown_only or groups[y, x] else ON_BACKGROUND * covered
             continue
         rest = {n: 1 - covers(shape, y, x, centres[n], sizes[n]) for n in range(len(centres)) if n != k}
-        shown = np.prod([r for n, r in rest.items() if feet[n] > feet[k]])
+        shown = np.prod([r for n, r in rest.items() if nearer[n]])
         half = int(y + 0.5 >= place[1])
         mine = np.prod(list(rest.values())) + COLOUR * shown * tables[k, half, bins[y, x]]
         value += covered * (shown if shown_only else mine)
     return value / total
+
+
+def nearer_than(k, centres, sizes):
+    feet = centres[:, 1] + 0.5 * sizes[:, 1]
+    return feet > feet[k]
 
 
 def plain_place(scene, expected, sizes, sweeps):
@@ -50,6 +54,7 @@ def plain_place(scene, expected, sizes, sweeps):
     order = np.argsort(-(expected[:, 1] + 0.5 * sizes[:, 1]))
     for k in np.tile(order, sweeps):
         start, best, step = centres[k].copy(), -np.inf, 2.0
+        nearer = nearer_than(k, centres, sizes)
         reach, stride = 2.0 + 0.3 * sizes[k, 1], 2 if sizes[k, 0] >= 12 else 1
         while step >= 1.0:
             origin, better = centres[k].copy(), False
@@ -58,13 +63,15 @@ def plain_place(scene, expected, sizes, sweeps):
                 if np.abs(trial - start).max() > reach:
                     continue
                 pull = PULL * (((trial - expected[k]) / sizes[k]) ** 2).sum()
-                value = plain_worth(scene, centres, sizes, k, trial, stride=stride) - pull
+                value = plain_worth(scene, centres, sizes, k, trial, stride=stride, nearer=nearer) - pull
                 if value > best + 1e-9:
                     centres[k], best, better = trial, value, True
             step = step if better else step - 1.0
     shares = [
-        plain_worth(scene, centres, sizes, k, centres[k], stride=1, shown_only=True)
-        for k in range(len(centres))
+        plain_worth(
+            scene, centres, sizes, k, place, stride=1, nearer=nearer_than(k, centres, sizes), shown_only=True
+        )
+        for k, place in enumerate(centres)
     ]
     return centres, np.array(shares)
 
