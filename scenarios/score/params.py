@@ -33,6 +33,8 @@ class ScoringParams:
         full_gap: Most frames in a row that it may miss, and that its id may be on other riders.
         absorbed_share: A rider that stands is absorbed once no more of it is in the mask.
         flash_change: Least change of the light from one frame to the next, as a part of it, that is sudden.
+        min_hidden_frames: Least frames for which a vehicle below the platform is hidden in an event ...
+        min_scored_frames: ... and for which it is scored before it, and after.
         recovered_share: A mask has recovered once no more of the background is in it ...
         recovered_seconds: ... for so long.
     """
@@ -56,5 +58,7 @@ class ScoringParams:
     full_gap: int = 3
     absorbed_share: float = 0.2
     flash_change: float = 0.1
+    min_hidden_frames: int = 15
+    min_scored_frames: int = 30
     recovered_share: float = 0.05
     recovered_seconds: float = 0.5

@@ -23,9 +23,7 @@ class LookalikeFleet(Fleet):
         super().__init__(params, catalogue)
         self._share, self._sizes = params.lookalikes, [model.size for model in catalogue]
         cars = [k for k, model in enumerate(catalogue) if model.kind == Kind.CAR]
-        self.looks = tuple(
-            (cars[int(rng.integers(len(cars)))], self.paint(rng)) for _ in range(params.looks)
-        )
+        self.looks = tuple((cars[int(rng.integers(len(cars)))], self.paint(rng)) for _ in range(params.looks))
 
     def draw(self, rng: np.random.Generator, *, pace: float = 0.0, light: bool = False) -> Draw:
         """Draw one vehicle (see `Fleet.draw`)."""

@@ -73,7 +73,9 @@ class Flows:
         self._number = 0
         self._gaps = [self._stream("entry", k) for k in range(len(network.entries))]
         self._room = [self._draw_gap(k) for k in range(len(network.entries))]
-        self._lights = Lights(network.signals, self.world, self._stream("lights")) if network.signals else None
+        self._lights = (
+            Lights(network.signals, self.world, self._stream("lights")) if network.signals else None
+        )
 
     def fill(self, *, spared: tuple[int, float, float] | None = None) -> None:
         """Populate every entry's paths as far as they are to be.

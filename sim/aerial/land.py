@@ -52,7 +52,9 @@ class Land:
         self._index = {model.name: k for k, model in enumerate(models)}
         self._cars = [k for k, model in enumerate(models) if model.kind == Kind.CAR]
         rng = self._stream("leaves")
-        self._hues = LEAVES[rng.permutation(len(LEAVES))[:4]] * rng.uniform((0.80, 0.84, 0.74), (1.0, 0.98, 0.95))
+        self._hues = LEAVES[rng.permutation(len(LEAVES))[:4]] * rng.uniform(
+            (0.80, 0.84, 0.74), (1.0, 0.98, 0.95)
+        )
         self._rows: list[tuple[int, float, float, float, Floats, Floats]] = []
 
     def furnish(self, parcels: Sequence[Parcel]) -> None:
@@ -143,7 +145,9 @@ class Land:
         if self._free.room(x, y) < 1.8:
             return
         hue = self._hues[int(rng.integers(len(self._hues)))] * rng.uniform(0.8, 1.05)
-        self._add(name, x, y, float(rng.uniform(0, 6.28)), self._size(name) * rng.uniform(0.8, 1.5), hue.clip(0, 1))
+        self._add(
+            name, x, y, float(rng.uniform(0, 6.28)), self._size(name) * rng.uniform(0.8, 1.5), hue.clip(0, 1)
+        )
 
     def _wood(self, parcel: Parcel, rng: np.random.Generator) -> None:
         count = int(parcel.length * parcel.width / _WOOD_SPACING**2 * min(self._params.trees, 1.5))

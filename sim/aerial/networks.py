@@ -289,7 +289,9 @@ def crossing_roads(params: AerialRoadParams, traffic: AerialTrafficParams) -> Ne
             )
         for offset in offsets[1:]:
             network.add_lane(
-                f"e{arm}", f"o{arm}", straight(BOX * out - offset * left_of_out, ARM * out - offset * left_of_out)
+                f"e{arm}",
+                f"o{arm}",
+                straight(BOX * out - offset * left_of_out, ARM * out - offset * left_of_out),
             )
     for arm in range(4):
         out = np.array([np.cos(arm * np.pi / 2), np.sin(arm * np.pi / 2)])

@@ -139,9 +139,7 @@ def _deck(builder: MeshBuilder, bridge: Overpass) -> None:
         builder.box((-reach, y[0], top - 0.4), (reach, y[1], top + PARAPET), Surface.CONCRETE, without="-z")
     for x in np.arange(-half + 9.0, half - 8.0, 18.0) if bridge.span > 60 else (-half + 2.0, half - 2.0):
         for y0 in np.linspace(-side + 1.5, side - 2.5, max(2, int(bridge.width / 7))):
-            builder.box(
-                (x - 0.5, y0, 0), (x + 0.5, y0 + 1.0, top - DEPTH), Surface.CONCRETE, without="-z+z"
-            )
+            builder.box((x - 0.5, y0, 0), (x + 0.5, y0 + 1.0, top - DEPTH), Surface.CONCRETE, without="-z+z")
 
 
 def _embankments(builder: MeshBuilder, bridge: Overpass) -> None:

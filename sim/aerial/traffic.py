@@ -161,5 +161,3 @@ def _bodies(travellers: Sequence[Traveller], overpass: Overpass | None, first: i
         lamps=np.zeros(count, np.uint8),
         leans=np.zeros((count, 2)),
     )
-
-

@@ -142,5 +142,3 @@ def view_reach(camera: Camera, params: AerialParams) -> float:
     ground = pose.position[:2] - rays[:, :2] * (height / rays[:, 2:])
     aim = np.array([height * np.tan(tilt), 0.0])
     return float(np.hypot(*(ground - aim).T).max()) + 6.0
-
-
