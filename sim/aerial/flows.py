@@ -18,6 +18,8 @@ LEAVE = 6.0
 """Metres before a path's end where vehicles leave."""
 COMMITTED = 2.6
 """M/s^2: who would have to brake harder for a light that turns red drives on."""
+FIRST_GREEN = (3.0, 11.0)
+"""Seconds after the traffic's beginning in which an intersection's first phase begins, after one of red."""
 
 
 @dataclass(slots=True, eq=False)
@@ -218,10 +220,10 @@ class Lights:
     """The lights of an intersection: they put stop lines into lanes and take them out."""
 
     def __init__(self, signals: Signals, world: IndexedRoad, rng: np.random.Generator) -> None:
-        """Set them up with a stop line for each lane; the run begins somewhere in the cycle."""
+        """Set them up with a stop line for each lane; the first phase begins within `FIRST_GREEN` seconds."""
         self._signals, self._world = signals, world
         self._spans = [green + signals.clearance for green in signals.greens]
-        self._offset = float(rng.uniform(0, sum(self._spans)))
+        self._offset = -float(rng.uniform(*FIRST_GREEN))
         self._lines = {index: StopLine(world, index, along) for index, along in signals.lines.items()}
         self._red: set[tuple[str, str, int]] = set()
 

@@ -360,8 +360,8 @@ def _with_lights(
     turns = [[(f"i{arm}", f"a{arm}", 0)] for arm in range(4)]
     signals = Signals(
         phases=tuple(tuple(group[a] + group[a + 2]) for a in (0, 1) for group in (straight_on, turns)),
-        greens=(9.0, 4.5, 9.0, 4.5),
-        clearance=4.0,
+        greens=(10.0, 3.0, 6.0, 3.0),
+        clearance=3.0,
         lines=lines,
     )
     strips, stops, zebras = [], [], []

@@ -13,8 +13,10 @@ from sim.aerial.networks import ARM, BOX, Network, Strip, along_road, crossing_r
 from sim.aerial.overpass import Overpass
 from sim.aerial.parcels import Free, divide
 from sim.aerial.photo import photograph
+from sim.aerial.replay import decks, middle_and_heading, surroundings
 from sim.models import Ground, Model, Photo
 from sim.params import AerialParams, AerialRoadParams
+from sim.recorded import Recording
 from sim.rng import stream
 from sim.roads import PLAIN_DROP, InCarRoad
 from sim.world import Bodies
@@ -77,15 +79,18 @@ class Site:
     ground: Ground
 
 
-def lay_out(params: AerialParams, seconds: float, seed: int) -> Layout:
+def lay_out(params: AerialParams, seconds: float, seed: int, recording: Recording | None = None) -> Layout:
     """Draw roads and bridges.
 
     Args:
         params: Of the scene.
         seconds: How long the platform flies.
         seed: The episode's.
+        recording: Traffic whose roads are taken, in place of a network of ours.
     """
     rng = stream(seed, "aerial", "roads")
+    if recording is not None:
+        return _around(params, seconds, recording, rng)
     traffic = params.traffic
     if params.road.network == "intersection":
         network = crossing_roads(params.road, traffic)
@@ -116,6 +121,25 @@ def lay_out(params: AerialParams, seconds: float, seed: int) -> Layout:
         start=start,
         across=float(road.heading(0.5 * road.length)) if params.road.network != "u-turn" else 0.0,
         overpasses=overpasses,
+    )
+
+
+def _around(
+    params: AerialParams, seconds: float, recording: Recording, rng: np.random.Generator
+) -> Layout:
+    """Lay out what is around recorded traffic; the camera looks at the middle of it."""
+    middle, heading = middle_and_heading(recording)
+    ahead = np.array([np.cos(heading), np.sin(heading)])
+    reach = abs(params.platform.speed) * seconds + params.platform.sway + 1.0
+    places = np.arange(-reach, reach + 1.0)
+    return Layout(
+        network=surroundings(recording),
+        road=None,
+        course=middle + places[:, None] * ahead,
+        step=1.0,
+        start=reach - 0.5 * params.platform.speed * seconds,
+        across=heading,
+        overpasses=decks(params.road, middle, heading, rng),
     )
 
 
