@@ -272,7 +272,7 @@ class AerialTrafficParams(TrafficParams):
     buses: Fraction = 0.02
     waves: Fraction = 0.92
     """How much slower than free traffic the troughs of the waves are that run through a dense stream."""
-    lookalikes: Fraction = 0.75
+    lookalikes: Fraction = 0.85
     """Share of the vehicles that are of one of `looks` models and paints."""
     looks: Annotated[int, Field(ge=1, le=8)] = 2
     convoy: Annotated[int, Field(ge=0, le=20)] = 0

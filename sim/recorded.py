@@ -149,7 +149,7 @@ def resample(recording: Recording, rate: int, *, start: float, ticks: int) -> Sa
 
 
 def headings(positions: ArrayLike) -> Floats:
-    """Tell the way that a vehicle heads from where it was: (T,) unwrapped radians, not a number if it never moved.
+    """Tell which way a vehicle heads: (T,) unwrapped radians, not a number if it never moved.
 
     Each is the direction between the nearest samples before and after that lie `_STRIDE` metres away or
     more; where it stood, the nearest such direction.
@@ -172,7 +172,9 @@ def _common_road(path: Path) -> tuple[list[Way], list[tuple[Floats, Floats]]]:
     step = float(root.attrib["timeStepSize"])
     ways = []
     for node in root:
-        dynamic = node.tag == "dynamicObstacle" or (node.tag == "obstacle" and node.findtext("role") == "dynamic")
+        dynamic = node.tag == "dynamicObstacle" or (
+            node.tag == "obstacle" and node.findtext("role") == "dynamic"
+        )
         if not dynamic:
             continue
         states = [node.find("initialState"), *(node.find("trajectory") or ())]
@@ -191,7 +193,8 @@ def _common_road(path: Path) -> tuple[list[Way], list[tuple[Floats, Floats]]]:
             )
         )
     lanes = [
-        (_border(lane.find("leftBound")), _border(lane.find("rightBound"))) for lane in root.iter("lanelet")
+        (_border(lane.find("leftBound")), _border(lane.find("rightBound")))
+        for lane in root.iter("lanelet")
         if lane.find("leftBound") is not None
     ]
     return ways, lanes

@@ -1,4 +1,4 @@
-"""Vehicles that vanish from an aerial camera's sight and come back (scoring.md 10), and how hard each is to tell."""
+"""Vehicles that vanish from an aerial camera's sight and come back (scoring.md 10)."""
 
 from __future__ import annotations
 
@@ -124,9 +124,7 @@ def _with_company(
         if other.vehicle != one.vehicle and other.first <= one.last and one.first <= other.last
     }
     looks = _look(one, truths, rows)
-    alike = tuple(
-        vehicle for vehicle, other in others.items() if _same(looks, _look(other, truths, rows))
-    )
+    alike = tuple(vehicle for vehicle, other in others.items() if _same(looks, _look(other, truths, rows)))
     return replace(one, together=tuple(others), lookalikes=alike)
 
 

@@ -18,7 +18,7 @@ LEAVE = 6.0
 """Metres before a path's end where vehicles leave."""
 COMMITTED = 2.6
 """M/s^2: who would have to brake harder for a light that turns red drives on."""
-FIRST_GREEN = (3.0, 11.0)
+FIRST_GREEN = (5.0, 10.0)
 """Seconds after the traffic's beginning in which an intersection's first phase begins, after one of red."""
 
 

@@ -1,4 +1,4 @@
-"""What stands on the land: houses and halls on their plots, parked cars, woods, hedges, trees over the road."""
+"""What stands on the land: houses and halls on their plots, parked cars, woods, trees over the road."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the land around the roads is used: plots in rows, each a field, a wood, a garden with a house, a yard."""
+"""How the land around the roads is used: plots in rows, each a field, a wood, a garden, a yard."""
 
 from __future__ import annotations
 

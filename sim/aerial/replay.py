@@ -22,6 +22,8 @@ LANE = 3.9
 """Metres of asphalt around each way that was driven, where the recording has no lanes."""
 DECK = 420.0
 """Metres of a bridge's deck: its ends are out of sight."""
+LEAD_ON = 160.0
+"""Metres by which a map's outermost lanes are led on."""
 SPACING = 70.0
 """Metres between bridges."""
 
@@ -118,6 +120,7 @@ def surroundings(recording: Recording) -> Network:
         left, right = left[:count], right[:count]
         width = float(np.median(np.hypot(*(left - right).T)))
         strips.append(_strip((left + right) / 2, width / 2, (width / 2, -width / 2)))
+    strips += _continued(strips)
     if not strips:
         for way in recording.ways:
             away = np.hypot(*(way.positions - way.positions[0]).T)
@@ -127,6 +130,22 @@ def surroundings(recording: Recording) -> Network:
                     strips.append(_strip(way.positions[keep], LANE / 2, ()))
     nothing = np.zeros((0, 2, 2))
     return Network(lanes=None, entries=(), strips=tuple(strips), stop_lines=nothing, crossings=nothing)
+
+
+def _continued(strips: Sequence[Strip]) -> list[Strip]:
+    """Lead lanes on that end where no other begins: a recording's map ends sooner than the road."""
+    ends = np.array([strip.line[k] for strip in strips for k in (0, -1)]).reshape(-1, 2)
+    more = []
+    for n, strip in enumerate(strips):
+        for k, sign in ((0, -1.0), (-1, 1.0)):
+            away = np.hypot(*(ends - strip.line[k]).T)
+            away[2 * n + (k == -1)] = np.inf
+            if away.min() > 1.0:
+                heading = float(strip.headings[k])
+                ahead = sign * np.array([np.cos(heading), np.sin(heading)])
+                line = strip.line[k] + np.arange(0.0, LEAD_ON, 4.0)[:, None] * ahead
+                more.append(_strip(line, strip.paved[1], strip.edges.tolist()))
+    return more
 
 
 def middle_and_heading(recording: Recording) -> tuple[Floats, float]:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.aerial.crossing import ARM, BOX, crossing_roads
 from sim.aerial.land import Land
-from sim.aerial.networks import ARM, BOX, Network, Strip, along_road, crossing_roads, lay_road
+from sim.aerial.networks import Network, Strip, along_road, lay_road
 from sim.aerial.overpass import Overpass
 from sim.aerial.parcels import Free, divide
 from sim.aerial.photo import photograph
@@ -124,9 +125,7 @@ def lay_out(params: AerialParams, seconds: float, seed: int, recording: Recordin
     )
 
 
-def _around(
-    params: AerialParams, seconds: float, recording: Recording, rng: np.random.Generator
-) -> Layout:
+def _around(params: AerialParams, seconds: float, recording: Recording, rng: np.random.Generator) -> Layout:
     """Lay out what is around recorded traffic; the camera looks at the middle of it."""
     middle, heading = middle_and_heading(recording)
     ahead = np.array([np.cos(heading), np.sin(heading)])
@@ -177,7 +176,7 @@ def _with_arms(params: AerialRoadParams, network: Network, rng: np.random.Genera
 def _bridge_over(
     road: InCarRoad, strip: Strip, sites: Sequence[float], width: float, rng: np.random.Generator
 ) -> tuple[Overpass, ...]:
-    """Put bridges across a road near the given places along it; one whose embankments have no room is left out."""
+    """Put bridges across a road near the given places along it; those without room are left out."""
     found: list[Overpass] = []
     for wanted in sites:
         for attempt in range(24):
@@ -263,7 +262,7 @@ def furnish(
 
 def make_ground(photo: Photo) -> Ground:
     """Lay a photo flat, and a plain below it out to where nothing is seen."""
-    west, south = photo.low
+    south = photo.low[1]
     width, depth = photo.extent
     inner = np.array([[0, 0], [width, 0], [width, depth], [0, depth]]) + photo.low
     outer = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * HORIZON + inner

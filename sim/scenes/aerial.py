@@ -7,7 +7,6 @@ where that swings to and fro, vehicles leave the picture and come back.
 
 from __future__ import annotations
 
-
 import numpy as np
 from numpy.typing import NDArray
 
