@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from scenarios.log import EpisodeLog
+from scenarios.score.disappearances import disappearances, summary
 from scenarios.score.frames import scored_frames
 from scenarios.score.identification import CLASSES, JudgedTrace
 from scenarios.score.params import Boxes, ScoringParams
 from sim.truth.events import occlusion_events
+from sim.truth.types import AerialTruth
 from tracker.boxes import intersection
 
 
@@ -32,7 +34,8 @@ def difficulty(
         true class, null if the tracker shows none, on the lane ``riders_in_view``; ``overlapping_pairs`` of
         scored objects whose boxes meet in some frame; and ``events`` by kind: how often an object was hidden
         that had been scored within the second before, how often it was seen again, and the median of the
-        seconds it then had been hidden.
+        seconds it then had been hidden. From the air, ``disappearances`` too: the events that re-acquisition is
+        scored by (`scenarios.score.disappearances.summary`).
     """
     scored_at: dict[int, list[int]] = defaultdict(list)
     pairs: set[tuple[int, int]] = set()
@@ -50,6 +53,11 @@ def difficulty(
     if log.scene == "motorcycle-lane":
         view = {"mean": float(np.mean(in_view)), "most": float(max(in_view))} if in_view else None
         return counts | {"riders_in_view": view} | hidden
+    if log.scene == "aerial":
+        truth = [frame for frame in log.truth if isinstance(frame, AerialTruth)]
+        return (
+            counts | hidden | {"disappearances": summary(disappearances(truth, log.rate, params), log.rate)}
+        )
     classes = [trace.truth for trace in traces]
     by_class = {name: classes.count(name) if log.traces is not None else None for name in CLASSES}
     return counts | {"traces": by_class} | hidden
@@ -65,12 +73,12 @@ def _events(log: EpisodeLog, scored_at: Mapping[int, Sequence[int]]) -> dict[str
         "occluded": [event for event in events if event.occluder],
         "out_of_view": [event for event in events if not event.occluder],
     }
-    summary = {}
+    found = {}
     for kind, chosen in kinds.items():
         back = [(event.last - event.first + 1) / log.rate for event in chosen if event.returned is not None]
-        summary[kind] = {
+        found[kind] = {
             "count": len(chosen),
             "returned": len(back),
             "median_hidden_s": float(np.median(back)) if back else None,
         }
-    return summary
+    return found

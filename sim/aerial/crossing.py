@@ -32,7 +32,7 @@ def crossing_roads(params: AerialRoadParams, traffic: AerialTrafficParams) -> Ne
     width, through = params.lane_width, params.lanes
     network = RoadNetwork()
     # Of arms at 0, offsets to the right of the arm's inward direction; straight on, lane k meets exit k - 1.
-    offsets = (np.arange(through + 1) + 0.5) * width
+    offsets: Floats = (np.arange(through + 1, dtype=np.float64) + 0.5) * width
     common = {"width": width, "speed_limit": None}
 
     def straight(start: Floats, end: Floats) -> Any:

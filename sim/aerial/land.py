@@ -85,11 +85,12 @@ class Land:
                     for step in range(int(rng.integers(1, 4))):
                         at = min(place + 4 * step, len(strip.line) - 1)
                         away = float(rng.uniform(0.6, 1.8))
-                        self._tree(*strip.beside(edge + side * away)[at], rng, wide=1.25, keep=0.3)
+                        x, y = strip.beside(edge + side * away)[at].tolist()
+                        self._tree(x, y, rng, wide=1.25, keep=0.3)
                 for _ in range(rng.poisson(34.0 * self._params.trees * kilometres)):
                     place = int(rng.integers(len(strip.line)))
                     away = float(rng.gamma(2.0, 4.0)) + 3.0
-                    x, y = strip.beside(edge + side * away)[place]
+                    x, y = strip.beside(edge + side * away)[place].tolist()
                     if rng.random() < 0.5:
                         self._tree(x, y, rng)
                     else:

@@ -16,7 +16,7 @@ Life = tuple[Sequence[float], Sequence[float], tuple[float, float, float]]
 
 
 def episode(lives: Mapping[int, Life], *, inside: float = 1.0) -> list[AerialTruth]:
-    """Vehicles as (visible share a frame, speed a frame, colour); ``inside`` is the share within the frame."""
+    """Vehicles as (visible share a frame, speed a frame, colour); ``inside``: the share in the frame."""
     frames = len(next(iter(lives.values()))[0])
     n = len(lives)
     truths = []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -51,7 +53,7 @@ def test_paths_have_no_gaps_and_no_kinks(name):
         assert sum(entry.shares) == pytest.approx(1.0)
         for path in entry.paths:
             lanes = [made.lanes.get_lane(index) for index in path.lanes]
-            for before, after in zip(lanes[:-1], lanes[1:], strict=True):
+            for before, after in pairwise(lanes):
                 assert np.allclose(before.position(before.length, 0), after.position(0, 0), atol=1e-6)
                 turn = before.heading_at(before.length) - after.heading_at(0)
                 assert np.cos(turn) == pytest.approx(1.0)
