@@ -34,8 +34,8 @@ def difficulty(
         true class, null if the tracker shows none, on the lane ``riders_in_view``; ``overlapping_pairs`` of
         scored objects whose boxes meet in some frame; and ``events`` by kind: how often an object was hidden
         that had been scored within the second before, how often it was seen again, and the median of the
-        seconds it then had been hidden. From the air, ``disappearances`` too: the events that re-acquisition is
-        scored by (`scenarios.score.disappearances.summary`).
+        seconds it then had been hidden. From the air, ``disappearances`` too: the events that re-acquisition
+        is scored by (`scenarios.score.disappearances.summary`).
     """
     scored_at: dict[int, list[int]] = defaultdict(list)
     pairs: set[tuple[int, int]] = set()

@@ -15,16 +15,14 @@ Floats = NDArray[np.float64]
 
 BOX = 22.0
 """Metres from an intersection's middle to its stop lines."""
-ARM = 210.0
-"""Metres from an intersection's middle to the ends of its roads."""
 
 
-def crossing_roads(params: AerialRoadParams, traffic: AerialTrafficParams) -> Network:
+def crossing_roads(params: AerialRoadParams, traffic: AerialTrafficParams, arm_length: float) -> Network:
     """Lay two roads that cross at the origin, with lights and lanes of their own for those who turn left.
 
     Arms are numbered counter-clockwise from east. On each, seen by those who come in, lane 0 turns left, the
     others go straight on and the last turns right too. Phases: straight on and right of two opposite arms,
-    then their left turns.
+    then their left turns. Each arm is ``arm_length`` metres long, from the middle.
     """
     from highway_env.road.lane import CircularLane, StraightLane
     from highway_env.road.road import RoadNetwork
@@ -46,13 +44,13 @@ def crossing_roads(params: AerialRoadParams, traffic: AerialTrafficParams) -> Ne
             stop = BOX - (width if lane == 0 else 0.0)
             network.add_lane(
                 *_approach(arm, lane)[:2],
-                straight(ARM * out + offset * left_of_out, stop * out + offset * left_of_out),
+                straight(arm_length * out + offset * left_of_out, stop * out + offset * left_of_out),
             )
         for offset in offsets[1:]:
             network.add_lane(
                 f"e{arm}",
                 f"o{arm}",
-                straight(BOX * out - offset * left_of_out, ARM * out - offset * left_of_out),
+                straight(BOX * out - offset * left_of_out, arm_length * out - offset * left_of_out),
             )
     for arm in range(4):
         out = np.array([np.cos(arm * np.pi / 2), np.sin(arm * np.pi / 2)])
@@ -76,7 +74,7 @@ def crossing_roads(params: AerialRoadParams, traffic: AerialTrafficParams) -> Ne
                     to_plane(*centre), radius, first, first - bend * np.pi / 2, clockwise=bend < 0, **common
                 ),
             )
-    return _with_lights(params, traffic, network, offsets)
+    return _with_lights(params, traffic, network, offsets, arm_length)
 
 
 def _approach(arm: int, lane: int) -> LaneIndex:
@@ -89,7 +87,7 @@ def _approach(arm: int, lane: int) -> LaneIndex:
 
 
 def _with_lights(
-    params: AerialRoadParams, traffic: AerialTrafficParams, network: Any, offsets: Floats
+    params: AerialRoadParams, traffic: AerialTrafficParams, network: Any, offsets: Floats, arm_length: float
 ) -> Network:
     """Say who drives where on the lanes of two roads that cross, and what is painted there."""
     through, width = params.lanes, params.lane_width
@@ -139,7 +137,7 @@ def _with_lights(
     for arm in range(4):
         angle = arm * np.pi / 2
         out, side = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
-        s = np.arange(0.0, ARM - BOX + STEP, STEP)
+        s = np.arange(0.0, arm_length - BOX + STEP, STEP)
         marks = [(half - 0.25, 1), (0.0, 3), (-width, 3), (0.25 - half, 1)]
         marks += [(k * width, 1 if k == 1 else 2) for k in range(1, through + 1)]
         marks += [(-width - k * width, 2) for k in range(1, through)]

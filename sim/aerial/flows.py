@@ -177,7 +177,6 @@ class Flows:
                 speed = min(speed, ahead.driver.speed + 2.0)
                 closing = max(speed**2 - ahead.driver.speed**2, 0.0) / 3.0
                 if room - draw.size[0] < 3.0 + 0.8 * speed + closing:
-                    self._number += 1
                     continue
             self.add(draw, k, self._way(k), middle, speed)
             self._room[k] = self._draw_gap(k)

@@ -68,7 +68,7 @@ class AerialScene:
         recording = read(params.recording.path) if params.recording.path else None
         if recording is not None:
             models += rider_models()
-        self._layout = lay_out(params, seconds, seed, recording)
+        self._layout = lay_out(params, seconds, seed, view_reach(self.camera, params), recording)
         self._platform = Platform(params.platform, mount, across=self._layout.across + np.pi / 2, seed=seed)
         site = furnish(params, self._layout, self._area(seconds), models, seed)
         self._traffic: AerialTraffic | RecordedTraffic

@@ -31,7 +31,7 @@ LIGHT = AerialTrafficParams(density=14.0, oncoming_density=8.0)
 
 def network(name: str, seed: int = 1):
     if name == "intersection":
-        return crossing_roads(ROADS[name], LIGHT)
+        return crossing_roads(ROADS[name], LIGHT, 210.0)
     return along_road(lay_road(ROADS[name], 500.0, stream(seed, "road")), 14.0, 8.0)
 
 
@@ -88,7 +88,9 @@ def test_red_lights_hold_the_traffic_and_green_ones_let_it_go():
     crossed_on_green = 0
     for tick in range(420):
         green = traffic._lights.green(tick / 30)
-        recent = traffic._lights.green(tick / 30 - 2.5)
+        recent = frozenset().union(
+            *(traffic._lights.green(tick / 30 - back) for back in (1.0, 2.0, 3.0, 4.0))
+        )
         for each in traffic.travellers:
             index = each.driver.path.lanes[0]
             line = signals.lines[index]
@@ -154,7 +156,7 @@ def test_convoy_keeps_together_and_the_aim_follows_it():
         traffic=AerialTrafficParams(density=4.0, oncoming_density=4.0, convoy=6, waves=0.0, speed=12.0),
         platform=PlatformParams(altitude=150.0),
     )
-    layout = lay_out(params, 20.0, 4)
+    layout = lay_out(params, 20.0, 4, 110.0)
     traffic = AerialTraffic(params.traffic, layout, meshes.catalogue(), seed=4, rate=30)
     start = traffic.convoy_at()
     for _ in range(90):
@@ -184,7 +186,7 @@ def test_a_bridge_comes_down_to_the_ground_on_its_ramps():
 
 def test_levels_never_meet():
     params = AerialParams()
-    layout = lay_out(params, 4.0, 2)
+    layout = lay_out(params, 4.0, 2, 110.0)
     traffic = AerialTraffic(params.traffic, layout, meshes.catalogue(), seed=2, rate=30)
     bodies = traffic.vehicles()
     assert len(np.unique(bodies.ids)) == len(bodies)
