@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from scenarios.log import EpisodeLog
+from scenarios.score.disappearances import disappearances, summary
 from scenarios.score.frames import scored_frames
 from scenarios.score.identification import CLASSES, JudgedTrace
 from scenarios.score.params import Boxes, ScoringParams
 from sim.truth.events import occlusion_events
+from sim.truth.types import AerialTruth
 from tracker.boxes import intersection
 
 PARTLY = 0.3
@@ -36,7 +38,8 @@ def difficulty(
         share of its scored boxes behind others by more than `PARTLY`; ``overlapping_pairs`` of scored
         objects whose boxes meet in some frame; and ``events`` by kind: how often an object was hidden
         that had been scored within the second before, how often it was seen again, and the median of the
-        seconds it then had been hidden.
+        seconds it then had been hidden. From the air, ``disappearances`` too: the events that re-acquisition
+        is scored by (`scenarios.score.disappearances.summary`).
     """
     scored_at: dict[int, list[int]] = defaultdict(list)
     pairs: set[tuple[int, int]] = set()
@@ -57,6 +60,11 @@ def difficulty(
         view = {"mean": float(np.mean(in_view)), "most": float(max(in_view))} if in_view else None
         share = behind / sum(in_view) if any(in_view) else None
         return counts | {"riders_in_view": view, "partly_hidden": share} | hidden
+    if log.scene == "aerial":
+        truth = [frame for frame in log.truth if isinstance(frame, AerialTruth)]
+        return (
+            counts | hidden | {"disappearances": summary(disappearances(truth, log.rate, params), log.rate)}
+        )
     classes = [trace.truth for trace in traces]
     by_class = {name: classes.count(name) if log.traces is not None else None for name in CLASSES}
     return counts | {"traces": by_class} | hidden
@@ -72,12 +80,12 @@ def _events(log: EpisodeLog, scored_at: Mapping[int, Sequence[int]]) -> dict[str
         "occluded": [event for event in events if event.occluder],
         "out_of_view": [event for event in events if not event.occluder],
     }
-    summary = {}
+    found = {}
     for kind, chosen in kinds.items():
         back = [(event.last - event.first + 1) / log.rate for event in chosen if event.returned is not None]
-        summary[kind] = {
+        found[kind] = {
             "count": len(chosen),
             "returned": len(back),
             "median_hidden_s": float(np.median(back)) if back else None,
         }
-    return summary
+    return found
