@@ -118,7 +118,7 @@ class _Canvas:
 
     def blend(self, mask: Mask | Image, colour: ArrayLike | Image) -> None:
         """Lay a colour, (3,) or (H, W, 3), over the picture where a mask says how much."""
-        share = _share(mask) if mask.dtype == np.uint8 else np.asarray(mask, np.float32)
+        share = np.asarray(mask, np.float32) * np.float32(1 / 255 if mask.dtype == np.uint8 else 1)
         rows, columns = np.flatnonzero(share.any(axis=1)), np.flatnonzero(share.any(axis=0))
         if not len(rows):
             return
@@ -130,7 +130,7 @@ class _Canvas:
 
     def shade(self, mask: Mask | Image, change: float) -> None:
         """Lighten, or darken, the picture where a mask says how much."""
-        share = _share(mask) if mask.dtype == np.uint8 else np.asarray(mask, np.float32)
+        share = np.asarray(mask, np.float32) * np.float32(1 / 255 if mask.dtype == np.uint8 else 1)
         self.image += (change * share)[..., None]
 
 
