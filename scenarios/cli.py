@@ -201,7 +201,7 @@ def generate(
     from scenarios import spec
 
     resolved = spec.load(scenario, overrides or ())
-    from scenarios.generate import Dataset
+    from scenarios.dataset import Dataset
     from scenarios.generate import generate as write
     from scenarios.workers import open_workers
 
@@ -228,29 +228,19 @@ def replay(
 ) -> None:
     """Run what a manifest describes again, and say whether all comes out the same, or what differs first."""
     from scenarios import manifest as manifests
+    from scenarios.replay import describe
     from scenarios.replay import replay as run_again
 
     made = manifests.read(manifest)
-    frames = sum(map(len, made.episodes.values()))
-    with _progress(made.scenario.name, frames) as advance:
-        found = run_again(made, advance)
-    changed = {
-        name: [made.environment.get(name), value]
-        for name, value in manifests.environment().items()
-        if made.environment.get(name) != value
-    }
+    with _progress(made.scenario.name, made.frames) as advance:
+        document = describe(made, run_again(made, advance))
     if as_json:
-        where = {"seed": found.seed, "frame": found.frame, "stage": found.stage} if found else None
-        counts = {"episodes": len(made.episodes), "frames": frames}
-        _print_json({"agree": found is None, **counts, "diverges": where, "environment_changed": changed})
+        _print_json(document)
     else:
-        for name, (then, now) in changed.items():
-            print(f"{name} was {then}, is {now}", file=sys.stderr)
-        if found is None:
-            print(f"all agree: {len(made.episodes)} episodes, {frames} frames")
-        else:
-            print(f"seed {found.seed}, frame {found.frame} diverges first: {found.stage}")
-    raise typer.Exit(CANNOT if found else 0)
+        from scenarios.tables import print_replay
+
+        print_replay(document)
+    raise typer.Exit(0 if document["agree"] else CANNOT)
 
 
 @app.command()

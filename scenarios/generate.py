@@ -13,58 +13,20 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from scenarios import manifest as manifests
+from scenarios.dataset import TRUTH, Dataset, sequence_name
 from scenarios.errors import InputError
-from scenarios.export.frames import Coding
 from scenarios.files import moved_in
 from scenarios.output import to_json, write_json
-from scenarios.spec import Scenario
 from scenarios.workers import Progress, Workers
-
-Format = Literal["mot", "coco", "kitti"]
 
 PLAN = ".dataset.json"
 """What a directory is to hold: another dataset is never mixed into it."""
 STAGING = ".staging"
-TRUTH = "truth"
-"""Folder of what is true of the episodes; an episode that stands there is done."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Dataset:
-    """What to generate.
-
-    Attributes:
-        scenario: What is driven.
-        seeds: Which of its drives.
-        format: Of the files.
-        coding: Of the pictures.
-    """
-
-    scenario: Scenario
-    seeds: range
-    format: Format
-    coding: Coding = "png"
-
-    @property
-    def frames(self) -> int:
-        """Frames of all episodes together."""
-        return len(self.seeds) * self.scenario.frames
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the sequences."""
-        return [sequence_name(seed) for seed in self.seeds]
-
-
-def sequence_name(seed: int) -> str:
-    """Return the name of a seed's sequence, four digits or more, as KITTI has them."""
-    return f"{seed:04d}"
 
 
 def generate(

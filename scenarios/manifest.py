@@ -85,6 +85,11 @@ class Manifest:
     environment: dict[str, str]
     episodes: dict[int, list[Links]]
 
+    @property
+    def frames(self) -> int:
+        """Frames of all episodes together."""
+        return sum(map(len, self.episodes.values()))
+
 
 def environment() -> dict[str, str]:
     """Return versions and the OpenGL driver's own name.

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 from scenarios.loop import run_episode
-from scenarios.manifest import Chain, Links, Manifest
+from scenarios.manifest import Chain, Links, Manifest, environment
 from scenarios.runs import make_tracker
 from scenarios.workers import Progress
 from tracker.types import Diagnostics, Tracks
@@ -49,6 +49,21 @@ def replay(manifest: Manifest, progress: Progress | None = None) -> Divergence |
         if found is not None:
             return found
     return None
+
+
+def describe(manifest: Manifest, found: Divergence | None) -> dict[str, Any]:
+    """Return the document that ``--json`` prints: with what was found, what is no longer as it was."""
+    return {
+        "agree": found is None,
+        "episodes": len(manifest.episodes),
+        "frames": manifest.frames,
+        "diverges": asdict(found) if found else None,
+        "environment_changed": {
+            name: {"then": manifest.environment.get(name), "now": value}
+            for name, value in environment().items()
+            if manifest.environment.get(name) != value
+        },
+    }
 
 
 def _episode(

@@ -21,7 +21,7 @@ from scenarios.loop import run_episode
 from scenarios.output import write_json
 from scenarios.score.params import Boxes, ScoringParams
 from scenarios.spec import Scenario
-from scenarios.workers import Progress, Workers, open_workers
+from scenarios.workers import Progress, ThisProcess, Workers
 from tracker.base import Tracker
 from tracker.registry import make
 from tracker.types import Diagnostics, Tracks
@@ -105,10 +105,14 @@ def execute(
 
     for name in run.trackers:
         make_tracker(name)
-    with open_workers(1) as alone:
-        work = partial(run_seed, run, directory)
-        done = (workers or alone).each(work, run.seeds, frames=run.scenario.frames, progress=progress)
-        by_seed = dict(done)
+    by_seed = dict(
+        (workers or ThisProcess()).each(
+            partial(run_seed, run, directory),
+            run.seeds,
+            frames=run.scenario.frames,
+            progress=progress,
+        )
+    )
     episodes = {name: [by_seed[seed][name] for seed in run.seeds] for name in run.trackers}
     runs = [_joined(documents) for documents in episodes.values()]
     document = runs[0]

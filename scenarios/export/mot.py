@@ -2,8 +2,8 @@
 
 Frames count from 1. Left and top are x0 and y0 as they are, unshifted, in truth and tracks alike
 (scoring.md 3). The truth of a dataset, ``gt.txt``, has amodal boxes clipped to the frame, and its lines end
-with ``mark, class, visibility``: marked 1 where so much of the vehicle can be seen that it is to be found, else
-0. The class is always 1, the one that the benchmark and TrackEval evaluate.
+with ``mark, class, visibility``: marked 1 where so much of the vehicle can be seen that it is to be found,
+else 0. The class is always 1, the one that the benchmark and TrackEval evaluate.
 """
 
 from __future__ import annotations

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scenarios import manifest as manifests
+from scenarios.dataset import TRUTH, Dataset, Format, sequence_name
 from scenarios.export.coco import CocoLayout
 from scenarios.export.episode import Episode, Layout, record
 from scenarios.export.frames import FrameFiles, open_frames, write_depth
 from scenarios.export.kitti import KittiLayout
 from scenarios.export.mot import MotLayout
 from scenarios.export.truth import write_truth
-from scenarios.generate import TRUTH, Dataset, Format, sequence_name
 from scenarios.loop import make_scene
 from scenarios.manifest import Chain, Manifest
 from scenarios.workers import Progress

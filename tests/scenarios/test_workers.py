@@ -3,6 +3,8 @@
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -67,7 +69,7 @@ def test_workers_that_always_die_are_given_up():
 
 
 def test_an_error_of_the_work_is_raised_here():
-    with pytest.raises(InputError, match="no [45]"):
+    with pytest.raises(InputError, match=r"no [45]"):
         list(LocalPool(2).each(refuse, [4, 5], frames=1, progress=None))
     for process in multiprocessing.active_children():
         process.join(30)
@@ -77,6 +79,33 @@ def test_an_error_of_the_work_is_raised_here():
 def test_no_cluster_there():
     with pytest.raises(InputError, match="no Dask scheduler"), open_workers(1, "no address"):
         pass
+
+
+def test_workers_end_with_a_parent_that_is_killed(tmp_path):
+    program = (
+        "from functools import partial\nfrom pathlib import Path\n"
+        "from scenarios.workers import LocalPool\nfrom tests.scenarios.test_workers import slow\n"
+        "if __name__ == '__main__':\n"
+        f"    work = partial(slow, Path({str(tmp_path)!r}))\n"
+        "    list(LocalPool(2).each(work, range(2000), frames=1, progress=None))\n"
+    )
+    (script := tmp_path.parent / "killed.py").write_text(program)
+    parent = subprocess.Popen([sys.executable, str(script)], env=os.environ | {"PYTHONPATH": os.getcwd()})
+    while len(workers := {entry.name.partition("-")[2] for entry in tmp_path.iterdir()}) < 2:
+        assert parent.poll() is None
+        time.sleep(0.05)
+    parent.kill()
+    parent.wait()
+    while any(alive(int(worker)) for worker in workers):  # for ever, if they do not
+        time.sleep(0.05)
+
+
+def alive(pid):
+    """Say whether a process runs; one that has ended and waits to be reaped does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
 
 
 @pytest.mark.slow

@@ -112,9 +112,7 @@ class Kitti:
     """KITTI's files as the readmes of its devkits describe them, one sequence."""
 
     def __init__(self, root: Path, name: str) -> None:
-        self.labels = [
-            line.split() for line in (root / "label_02" / f"{name}.txt").read_text().splitlines()
-        ]
+        self.labels = [line.split() for line in (root / "label_02" / f"{name}.txt").read_text().splitlines()]
         self.calibration = {}
         for line in (root / "calib" / f"{name}.txt").read_text().splitlines():
             key, *numbers = line.split()
@@ -123,10 +121,11 @@ class Kitti:
 
     def corners(self, label: list[str]) -> np.ndarray:
         """(2, 8) pixels of the 3D box's corners."""
-        h, w, l, x, y, z, turn = map(float, label[10:17])
+        h, w, length, x, y, z, turn = map(float, label[10:17])
+        half = length / 2
         corners = np.array(
             [
-                [l / 2, l / 2, -l / 2, -l / 2, l / 2, l / 2, -l / 2, -l / 2],
+                [half, half, -half, -half, half, half, -half, -half],
                 [0, 0, 0, 0, -h, -h, -h, -h],
                 [w / 2, -w / 2, -w / 2, w / 2, w / 2, -w / 2, -w / 2, w / 2],
             ]
@@ -213,8 +212,12 @@ def test_kittis_rates_are_those_of_the_motion(kitti):
     poses = kitti.unit_poses()
     for k in range(1, len(poses) - 1):
         turned = poses[k - 1][1].T @ poses[k + 1][1]
-        seen = 0.5 * episodes.RATE * np.array(
-            [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
+        seen = (
+            0.5
+            * episodes.RATE
+            * np.array(
+                [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
+            )
         )
         np.testing.assert_allclose(kitti.oxts[k, 17:20], seen / 2, atol=0.01)
 

@@ -52,7 +52,7 @@ def test_calibration_and_poses_project_the_world_into_the_picture(folder):
     for line in map(json.loads, (folder / "frames.jsonl").read_text().splitlines()):
         pose = Pose(np.array(line["camera"]["position"]), np.array(line["camera"]["rotation"]))
         for found in line["objects"]:
-            middle = np.array(found["position"]) + [0, 0, found["size"][2] / 2]
+            middle = np.add(found["position"], (0, 0, found["size"][2] / 2))
             (x, y), _ = project(camera, pose, middle)
             x0, y0, x1, y1 = found["box_amodal"]
             assert x0 <= x <= x1
