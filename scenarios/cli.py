@@ -71,7 +71,11 @@ def run(
     jobs: Annotated[int, typer.Option(metavar="J", help="Processes; the scores do not depend on it.")] = 1,
     tracker: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME|module:object", help="Once or more; the scene's own if not said."),
+        typer.Option(
+            metavar="NAME|module:object",
+            help="Once or more; the scene's own if not said. One that starts at detections takes @DETECTOR: "
+            "@perfect, @noisy, @mask, or @ one of ours; with association@DETECTOR the association is true.",
+        ),
     ] = None,
     overrides: Annotated[
         list[str] | None,
@@ -98,7 +102,7 @@ def run(
     from scenarios.runs import Run, execute, make_tracker
 
     for name in names:
-        make_tracker(name)
+        make_tracker(name, resolved)
     wanted = Run(
         scenario=resolved, seeds=chosen, trackers=names, boxes=boxes.value, odometry=odometry, jobs=jobs
     )

@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios import bridge
+from scenarios.detections import Fed
 from scenarios.log import EpisodeLog, TraceLog
 from scenarios.shown import ShownRows
 from scenarios.spec import Scenario, spec_id
-from sim.params import InCarParams
 from tracker.base import Tracker
 from tracker.types import Diagnostics, Frame, Info, Traces, Tracks
 
 if TYPE_CHECKING:
-    from sim.simulation import Observation, Scene
+    from sim.simulation import Observation
 
 OnFrame = Callable[["Observation", Mapping[str, tuple[Tracks, Diagnostics]]], None]
 """Is shown each frame with what every tracker made of it, by the tracker's name."""
@@ -52,9 +52,10 @@ def run_episode(
     Raises:
         RenderUnavailableError: If there is no off-screen OpenGL here.
     """
+    from sim.scenes import make_scene
     from sim.simulation import Simulation
 
-    scene = make_scene(scenario, seed)
+    scene = make_scene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
     with Simulation(scene, scenario.params.sensor, seed=seed) as simulation:
         return track_observations(
             simulation.run(scenario.frames),
@@ -65,17 +66,6 @@ def run_episode(
             odometry=odometry,
             on_frame=on_frame,
         )
-
-
-def make_scene(scenario: Scenario, seed: int) -> Scene:
-    """Populate the world of a scenario for one seed."""
-    # With the traffic and the meshes: heavy.
-    from sim.scenes.in_car import InCarScene
-    from sim.scenes.motorcycle_lane import MotorcycleLaneScene
-
-    if isinstance(scenario.params, InCarParams):
-        return InCarScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
-    return MotorcycleLaneScene(scenario.params, seed=seed, rate=scenario.rate)
 
 
 def track_observations(
@@ -180,6 +170,8 @@ class TrackerLog:
             frame: What it is given.
             observation: With the truth that its traces are scored by; None for a recording.
         """
+        if isinstance(self.tracker, Fed) and observation is not None:
+            self.tracker.look(frame, observation)
         started = time.perf_counter()
         tracks = self.tracker.step(frame)
         self.track_ms.append(_milliseconds_since(started))

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from scenarios.detections import make_fed
 from scenarios.errors import InputError
 from scenarios.log import EpisodeLog, save
 from scenarios.loop import run_episode
@@ -71,14 +72,21 @@ class Run:
         return directory
 
 
-def make_tracker(name: str) -> Tracker:
-    """Build a tracker by its name.
+def make_tracker(name: str, scenario: Scenario | None = None, seed: int = 0) -> Tracker:
+    """Build a tracker by its name; one that starts at detections is fed with them (`scenarios.detections`).
+
+    Args:
+        name: Of a tracker, or ``tracker@detector``.
+        scenario: What is driven; None for a recording, which has no truth to make detections of.
+        seed: Which of its drives: the errors of detectors with errors are drawn from it.
 
     Raises:
         InputError: If there is none, or it cannot be built.
     """
     try:
-        return make(name)
+        if scenario is None:
+            return make(name)
+        return make_fed(name, scenario.scene, rate=scenario.rate, seed=seed)
     except ValueError as error:
         raise InputError(str(error)) from error
     except TypeError as error:
@@ -100,7 +108,7 @@ def execute(run: Run, directory: Path | None = None, progress: Progress | None =
     from scenarios.score.statistics import paired
 
     for name in run.trackers:
-        make_tracker(name)
+        make_tracker(name, run.scenario, run.seeds[0])
     by_seed = dict(_episodes(run, directory, progress))
     episodes = {name: [by_seed[seed][name] for seed in run.seeds] for name in run.trackers}
     runs = [_joined(documents) for documents in episodes.values()]
@@ -121,7 +129,7 @@ def run_seed(
     """Run one episode, write what is kept of it, and return the document of each tracker by its name."""
     from scenarios.score.summary import score
 
-    trackers = {name: make_tracker(name) for name in run.trackers}
+    trackers = {name: make_tracker(name, run.scenario, seed) for name in run.trackers}
     documents = {}
     with ExitStack() as stack:
         recorders = {}
