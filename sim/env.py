@@ -92,7 +92,7 @@ class SceneEnv(gymnasium.Env[Image, Action]):
         camera = course.params.camera
         self.course = self._first = course
         self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "render_fps": course.rate}  # type: ignore[misc]
+        self.metadata = {**type(self).metadata, "render_fps": course.rate}
         self.observation_space = Box(0, 255, (camera.height, camera.width, 3), np.uint8)
         self.action_space = Box(-1.0, 1.0, (len(self.actions),), np.float32)
         if render_mode not in (None, "rgb_array"):
