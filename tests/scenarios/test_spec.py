@@ -75,9 +75,10 @@ def test_the_schema_describes_the_file():
     schema = spec.json_schema()
     assert {option["$ref"].rpartition("/")[2] for option in schema["oneOf"]} == {
         "InCarFile",
+        "AerialFile",
         "MotorcycleLaneFile",
     }
-    for name, table in (("InCarFile", "road"), ("MotorcycleLaneFile", "riders")):
+    for name, table in (("InCarFile", "road"), ("AerialFile", "platform"), ("MotorcycleLaneFile", "riders")):
         file = schema["$defs"][name]
         assert {"scene", "seconds", "rate", "sensor", table} <= set(file["properties"])
         assert file["additionalProperties"] is False
@@ -142,7 +143,7 @@ def test_keys_are_those_of_the_own_scene(overrides, parts):
         ('scene = "in-car"\n[camera]\nfocal = nan\n', ["camera.focal is nan"]),
         ('scene = "in-car"\n[camera]\nheight = -4\n', ["camera.height is -4"]),
         ("seconds = 3\n", ["'scene' is missing"]),
-        ('scene = "moon"\n', ["scene is 'moon'", "wanted 'in-car' or 'motorcycle-lane'"]),
+        ('scene = "moon"\n', ["scene is 'moon'", "wanted 'in-car' or 'aerial' or 'motorcycle-lane'"]),
         ("scene = \n", ["not TOML", "line 1"]),
     ],
 )
