@@ -12,7 +12,6 @@ from scenarios.generate import generate
 from scenarios.replay import Divergence, replay
 from scenarios.runs import Run
 from scenarios.workers import ThisProcess
-from sim.render.context import RenderUnavailableError, context
 from tests.scenarios.fakes import observations
 from tests.scenarios.test_cli import call
 
@@ -22,15 +21,7 @@ SEEDS = range(500, 502)
 
 
 @pytest.fixture(scope="module")
-def _needs_gl():
-    try:
-        context()
-    except RenderUnavailableError as error:
-        pytest.skip(str(error))
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory, _needs_gl):
+def folder(tmp_path_factory, gl):
     """What a run keeps of two short drives of two trackers."""
     place = tmp_path_factory.mktemp("run")
     scenario = spec.load("lane-flash", ["seconds=0.2", "light.flash_at=5.0"])
@@ -104,7 +95,7 @@ def test_a_later_episode_is_named(folder, tmp_path):
     assert replay(manifests.read(path)) == Divergence(501, 2, "truth")
 
 
-@pytest.mark.usefixtures("_needs_gl")
+@pytest.mark.usefixtures("gl")
 def test_a_dataset_agrees_with_its_manifest(tmp_path):
     scenario = spec.load("lane-day", ["seconds=0.1"])
     generate(Dataset(scenario=scenario, seeds=SEEDS, format="mot"), tmp_path / "set", ThisProcess())
