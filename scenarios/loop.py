@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios import bridge, digest
+from scenarios.errors import InputError
 from scenarios.log import EpisodeLog, TraceLog
 from scenarios.shown import ShownRows
 from scenarios.spec import Scenario, spec_id
-from sim.params import InCarParams
+from sim.params import AerialParams, InCarParams
 from tracker.base import Tracker
 from tracker.types import Diagnostics, Frame, Info, Traces, Tracks
 
@@ -68,13 +69,24 @@ def run_episode(
 
 
 def make_scene(scenario: Scenario, seed: int) -> Scene:
-    """Populate the world of a scenario for one seed."""
+    """Populate the world of a scenario for one seed.
+
+    Raises:
+        InputError: If its recording is missing or too short.
+    """
     # With the traffic and the meshes: heavy.
+    from sim.recorded import RecordingError
+    from sim.scenes.aerial import AerialScene
     from sim.scenes.in_car import InCarScene
     from sim.scenes.motorcycle_lane import MotorcycleLaneScene
 
     if isinstance(scenario.params, InCarParams):
         return InCarScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
+    if isinstance(scenario.params, AerialParams):
+        try:
+            return AerialScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
+        except RecordingError as error:
+            raise InputError(str(error)) from error
     return MotorcycleLaneScene(scenario.params, seed=seed, rate=scenario.rate)
 
 

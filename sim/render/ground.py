@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +86,13 @@ class Stretches:
         out["base_vertex"] = self.base_vertex[rows]
         out["base_instance"] = np.arange(len(rows))
         return out.ravel()
+
+
+def vertex_layout(shader: Any, vertices: Any, stretches: Any) -> list[tuple[Any, ...]]:
+    """Return what a ground's shader reads of both buffers: one that paints a photo needs no arc lengths."""
+    if "in_road" in shader:
+        return [(vertices, "3f 2f", "in_position", "in_road"), (stretches, "3f 1f/i", "i_offset", "i_arc")]
+    return [(vertices, "3f 8x", "in_position"), (stretches, "3f 4x/i", "i_offset")]
 
 
 def cut(ground: Ground) -> Stretches:
@@ -224,6 +232,14 @@ def road_texture(ground: Ground, seed: int) -> NDArray[np.uint8]:
     wear = np.clip(0.5 + 0.2 * fractal(rng, shape, 0.7, lowest=4), 0, 1)
     channels = np.stack([albedo, tar, wear, dust], axis=-1)
     return (np.clip(channels, 0, 1) * 255 + 0.5).astype(np.uint8)
+
+
+def ground_texture(ground: Ground, seed: int) -> NDArray[np.uint8]:
+    """Return what the paved band is painted from, (H, W, 4): the ground's photo, or a worn road."""
+    if ground.photo is None:
+        return road_texture(ground, seed)
+    image = ground.photo.image
+    return np.concatenate([image, np.full_like(image[..., :1], 255)], axis=-1)
 
 
 def mark_table(ground: Ground) -> NDArray[np.float32]:

@@ -1,6 +1,8 @@
 """The log odds that an outline is a vehicle's that goes the ego's way: boosted trees over its cues.
 
-The trees (outline_odds.npz) were learnt from simulated drives by ``python -m tests.training.outlines``.
+The trees (outline_odds.npz) were learnt from simulated drives. They are of an earlier state of
+``python -m tests.training.outlines``, which learnt from the mistakes of still earlier trees; that command now
+begins from nothing and makes others, as good on simulated drives (`docs/outlines.md`).
 """
 
 from __future__ import annotations
