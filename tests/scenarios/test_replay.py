@@ -13,11 +13,15 @@ from scenarios.replay import Divergence, replay
 from scenarios.runs import Run
 from scenarios.workers import ThisProcess
 from tests.scenarios.fakes import observations
-from tests.scenarios.test_cli import call
+from tests.scenarios.test_cli import MiddleTracker, call
 
 SILENT = "tests.scenarios.fakes:SilentTracker"
 MIDDLE = "tests.scenarios.test_cli:MiddleTracker"
 SEEDS = range(500, 502)
+
+
+class OtherTracker(MiddleTracker):
+    """As good as the other, under another name."""
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +82,7 @@ def test_light_that_comes_earlier_is_found_in_its_frame(folder, tmp_path, capsys
     [
         ("scenario.params.riders.riders", 5, 0, "truth"),
         ("scenario.params.sensor.noise", 9.0, 0, "image"),
-        ("trackers.1", "tests.scenarios.fakes:BrightTracker", 0, "tracks"),
+        ("trackers.1", "tests.scenarios.test_replay:OtherTracker", 0, "tracks"),
         ("scenario.seconds", 0.1, 3, "length"),
         ("scenario.seconds", 0.3, 6, "length"),
         ("episodes.0.frames.4.image", "0" * 32, 4, "image"),
