@@ -23,19 +23,13 @@ from scenarios.export.writer import LAYOUTS
 from scenarios.generate import generate
 from scenarios.loop import run_episode
 from scenarios.workers import LocalPool, ThisProcess, open_workers
-from sim.render.context import RenderUnavailableError, context
 from tests.scenarios.export.test_rle import naive_decode
 
 SCENARIO = spec.load("lane-day", ["seconds=0.1"])
 SEEDS = range(500, 503)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _needs_gl():
-    try:
-        context()
-    except RenderUnavailableError as error:
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("gl")
 
 
 def contents(root: Path) -> dict[str, bytes]:
@@ -47,7 +41,7 @@ def dataset(layout="mot", **changes):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def whole(tmp_path_factory, gl):
     """The dataset, drawn by one process in one go."""
     place = tmp_path_factory.mktemp("whole") / "deep" / "set"
     told = []

@@ -12,25 +12,20 @@ from scenarios.generate import generate
 from scenarios.replay import Divergence, replay
 from scenarios.runs import Run
 from scenarios.workers import ThisProcess
-from sim.render.context import RenderUnavailableError, context
 from tests.scenarios.fakes import observations
-from tests.scenarios.test_cli import call
+from tests.scenarios.test_cli import MiddleTracker, call
 
 SILENT = "tests.scenarios.fakes:SilentTracker"
 MIDDLE = "tests.scenarios.test_cli:MiddleTracker"
 SEEDS = range(500, 502)
 
 
-@pytest.fixture(scope="module")
-def _needs_gl():
-    try:
-        context()
-    except RenderUnavailableError as error:
-        pytest.skip(str(error))
+class OtherTracker(MiddleTracker):
+    """As good as the other, under another name."""
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, _needs_gl):
+def folder(tmp_path_factory, gl):
     """What a run keeps of two short drives of two trackers."""
     place = tmp_path_factory.mktemp("run")
     scenario = spec.load("lane-flash", ["seconds=0.2", "light.flash_at=5.0"])
@@ -87,7 +82,7 @@ def test_light_that_comes_earlier_is_found_in_its_frame(folder, tmp_path, capsys
     [
         ("scenario.params.riders.riders", 5, 0, "truth"),
         ("scenario.params.sensor.noise", 9.0, 0, "image"),
-        ("trackers.1", "tests.scenarios.fakes:BrightTracker", 0, "tracks"),
+        ("trackers.1", "tests.scenarios.test_replay:OtherTracker", 0, "tracks"),
         ("scenario.seconds", 0.1, 3, "length"),
         ("scenario.seconds", 0.3, 6, "length"),
         ("episodes.0.frames.4.image", "0" * 32, 4, "image"),
@@ -104,7 +99,7 @@ def test_a_later_episode_is_named(folder, tmp_path):
     assert replay(manifests.read(path)) == Divergence(501, 2, "truth")
 
 
-@pytest.mark.usefixtures("_needs_gl")
+@pytest.mark.usefixtures("gl")
 def test_a_dataset_agrees_with_its_manifest(tmp_path):
     scenario = spec.load("lane-day", ["seconds=0.1"])
     generate(Dataset(scenario=scenario, seeds=SEEDS, format="mot"), tmp_path / "set", ThisProcess())

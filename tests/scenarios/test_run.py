@@ -13,19 +13,13 @@ from scenarios import runs, spec
 from scenarios.log import load
 from scenarios.runs import Run
 from scenarios.workers import LocalPool
-from sim.render.context import RenderUnavailableError, context
 
 SILENT = "tests.scenarios.fakes:SilentTracker"
 MIDDLE = "tests.scenarios.test_cli:MiddleTracker"
 SHORT = ("--set", "seconds=0.5")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _needs_gl():
-    try:
-        context()
-    except RenderUnavailableError as error:
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("gl")
 
 
 def command(*arguments, hash_seed="0", start=subprocess.run, **options):
@@ -46,7 +40,7 @@ def document(*arguments, **options):
 
 
 @pytest.fixture(scope="module")
-def first():
+def first(gl):
     return document("--tracker", "in-car", hash_seed="1")
 
 
