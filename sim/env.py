@@ -73,7 +73,7 @@ class SceneEnv(gymnasium.Env[Image, Action]):
         RenderUnavailableError: From ``reset``, if there is no off-screen OpenGL here.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 30}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
 
     scene: ClassVar[str]
     """Its name."""
@@ -92,7 +92,7 @@ class SceneEnv(gymnasium.Env[Image, Action]):
         camera = course.params.camera
         self.course = self._first = course
         self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "render_fps": course.rate}  # type: ignore[misc]
+        self.metadata = {**type(self).metadata, "render_fps": course.rate}
         self.observation_space = Box(0, 255, (camera.height, camera.width, 3), np.uint8)
         self.action_space = Box(-1.0, 1.0, (len(self.actions),), np.float32)
         if render_mode not in (None, "rgb_array"):
@@ -200,6 +200,8 @@ class InCarEnv(SceneEnv):
     of = InCarParams
 
     def _driven(self, params: AnyParams) -> AnyParams:
+        if not isinstance(params, InCarParams):
+            return params
         return params.model_copy(update={"ego": params.ego.model_copy(update={"driver": "actions"})})
 
 
