@@ -248,6 +248,28 @@ def replay(
 
 
 @app.command()
+def check(
+    tracker: Annotated[
+        str, typer.Argument(metavar="NAME|module:object", help="A tracker, such as my_tracker:MyTracker.")
+    ],
+) -> None:
+    """Tell what a tracker does that its contract forbids, rule by rule; exit with 1 if there is anything."""
+    from tracker.base import ContractError, check_tracker
+    from tracker.registry import build
+
+    try:
+        candidate = build(tracker)
+    except (ValueError, TypeError) as error:
+        raise InputError(str(error)) from error
+    try:
+        check_tracker(candidate)
+    except ContractError as error:
+        print(error)
+        raise typer.Exit(1) from None
+    print(f"{tracker} keeps the contract")
+
+
+@app.command()
 def doctor(as_json: Json = False) -> None:
     """Say what works here, what does not, and the command that mends it."""
     from scenarios.doctor import examine

@@ -73,7 +73,7 @@ class SceneEnv(gymnasium.Env[Image, Action]):
         RenderUnavailableError: From ``reset``, if there is no off-screen OpenGL here.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012  the base class declares it so
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012
 
     scene: ClassVar[str]
     """Its name."""

@@ -53,7 +53,7 @@ class ContractError(ValueError):
 
 
 def check_tracker(tracker: object, *, frames: int = 8) -> None:
-    """Run the contract of a tracker on small made-up episodes.
+    """Run the contract of a tracker, of frames or of detections, on small made-up episodes.
 
     The pictures are noise with moving bright blocks in them: whether a tracker finds these does not matter,
     what it returns
@@ -68,7 +68,11 @@ def check_tracker(tracker: object, *, frames: int = 8) -> None:
         ContractError: If a rule is broken.
     """
     if not isinstance(tracker, Tracker):
-        raise ContractError(f"a {type(tracker).__name__} has no start(info) and step(frame)")
+        if not isinstance(tracker, DetectionTracker):
+            raise ContractError(
+                f"a {type(tracker).__name__} has no start(info) with step(frame) or follow(detections)"
+            )
+        tracker = _ByBlocks(tracker)
     broken: list[str] = []
     episodes = [
         _episode(frames, width=160, height=120, known=True),
@@ -94,12 +98,34 @@ def _episode(frames: int, *, width: int, height: int, known: bool) -> tuple[Info
     shown = []
     for tick in range(frames):
         image = rng.integers(60, 110, (height, width, 3), np.uint8)
-        for block in range(3):
-            x, y = 20 + 40 * block + 2 * tick * (block - 1), height // 2 + 4 * block
-            image[y : y + 14, max(x, 0) : x + 18] = 230 - 40 * block
+        for block, (x0, y0, x1, y1) in enumerate(_blocks(tick, height)):
+            image[y0:y1, x0:x1] = 230 - 40 * block
         odometry = Odometry(speed=12.0, yaw_rate=0.0) if known and tick % 2 == 0 else None
         shown.append(Frame(image=image, tick=tick, time=tick / rate, odometry=odometry))
     return Info(width=width, height=height, rate=rate, intrinsics=intrinsics), shown
+
+
+def _blocks(tick: int, height: int) -> NDArray[np.int64]:
+    """Give the boxes (3, 4) of the blocks in a picture."""
+    block = np.arange(3)
+    x, y = np.maximum(20 + 40 * block + 2 * tick * (block - 1), 0), height // 2 + 4 * block
+    return np.column_stack([x, y, x + 18, y + 14]).astype(np.int64)
+
+
+class _ByBlocks:
+    """A tracker of detections that is given the blocks: ``step`` stands for its ``follow``."""
+
+    def __init__(self, tracker: DetectionTracker) -> None:
+        self._tracker = tracker
+
+    def start(self, info: Info) -> None:
+        self._tracker.start(info)
+
+    def step(self, frame: Frame) -> Tracks:
+        boxes = _blocks(frame.tick, len(frame.image)).astype(np.float64)
+        return self._tracker.follow(
+            Detections(boxes=boxes, scores=np.full(3, 0.9), tick=frame.tick, time=frame.time)
+        )
 
 
 def _run(tracker: Tracker, info: Info, frames: list[Frame], broken: list[str]) -> list[Tracks]:

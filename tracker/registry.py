@@ -19,7 +19,7 @@ DETECTION_TRACKERS = {
     "norfair": "tracker.adapters.norfair:Norfair",
     "stone-soup-jpda": "tracker.adapters.stone_soup:Jpda",
 }
-"""Of others, that start at detections; each needs its own package (extra ``trackers``)."""
+"""Of others, that start at detections; each needs a package of its own (`tracker.adapters`)."""
 
 
 def make(name: str) -> Tracker:
@@ -50,4 +50,7 @@ def build(name: str) -> object:
     except (ImportError, AttributeError, ValueError) as error:
         known = ", ".join((*TRACKERS, *DETECTION_TRACKERS))
         raise ValueError(f"no tracker {name!r}: {error}; wanted one of {known}, or module:object") from error
-    return factory()
+    try:
+        return factory()
+    except ImportError as error:
+        raise ValueError(f"tracker {name!r} needs a package that is not here: {error}") from error
