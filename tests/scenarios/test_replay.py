@@ -36,10 +36,10 @@ def folder(tmp_path_factory, gl):
 def changed(folder, tmp_path, key, value):
     """The manifest with one parameter changed: a path of keys with dots."""
     document = json.loads((folder / "manifest.json").read_text())
-    *tables, last = key.split(".")
+    *tables, last = (int(part) if part.isdecimal() else part for part in key.split("."))
     inner = document
     for table in tables:
-        inner = inner[int(table)] if table.isdecimal() else inner[table]
+        inner = inner[table]
     assert inner[last] != value
     inner[last] = value
     (tmp_path / "manifest.json").write_text(json.dumps(document))

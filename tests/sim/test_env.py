@@ -130,7 +130,7 @@ def test_options_hold_for_one_episode():
     ("options", "message"),
     [
         ({"speed": 3}, "'speed' is unknown"),
-        ({"scenario": "lane-day"}, "another scene"),
+        ({"scenario": "lane-day"}, "unknown key 'traffic': wanted one of camera, lane, riders"),
         ({"scenario": "in-car-dai"}, "did you mean 'in-car-day'"),
         ({"overrides": ["camera.width=128"]}, "128 x 64, this environment's 96 x 64"),
     ],
