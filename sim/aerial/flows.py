@@ -238,20 +238,26 @@ class Lights:
     def step(self, t: float, travellers: list[Traveller]) -> None:
         """Show what is green at ``t`` seconds to ``travellers``."""
         green = self.green(t)
-        turned = [index for index in self._lines if index not in green and index not in self._red]
-        if turned:
-            for each in travellers:
-                self._decide(each, turned)
+        for index, line in self._lines.items():
+            if index not in green and index not in self._red:
+                self._decide(line, index, travellers)
         self._red = {index for index in self._lines if index not in green}
         self._world.objects = [line for index, line in self._lines.items() if index in self._red]
 
-    def _decide(self, each: Traveller, turned: list[tuple[str, str, int]]) -> None:
-        """Have who can no longer stop comfortably before a light that turns red drive on."""
-        driver = each.driver
-        index = driver.target_lane_index
-        if index not in turned:
-            return
-        left = self._signals.lines[index] - driver.place_on(driver.road.network.get_lane(index))[0]
-        left -= driver.LENGTH / 2
-        if left < driver.speed**2 / (2 * COMMITTED):
-            driver.running = self._lines[index]
+    def _decide(self, line: StopLine, index: tuple[str, str, int], travellers: list[Traveller]) -> None:
+        """Have those drive on who can no longer stop comfortably before a light that turns red.
+
+        Whoever is behind one who stops has to stop, too.
+        """
+        lane = self._world.network.get_lane(index)
+        end = self._signals.lines[index]
+        coming = []
+        for each in travellers:
+            driver = each.driver
+            driver.running = None if driver.running is line else driver.running
+            if driver.target_lane_index == index:
+                coming.append((end - driver.place_on(lane)[0] - driver.LENGTH / 2, driver))
+        for left, driver in sorted(coming, key=lambda one: one[0]):
+            if left >= driver.speed**2 / (2 * COMMITTED):
+                break
+            driver.running = line

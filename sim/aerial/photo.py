@@ -118,7 +118,7 @@ class _Canvas:
 
     def blend(self, mask: Mask | Image, colour: ArrayLike | Image) -> None:
         """Lay a colour, (3,) or (H, W, 3), over the picture where a mask says how much."""
-        share = np.asarray(mask, np.float32) * np.float32(1 / 255 if mask.dtype == np.uint8 else 1)
+        share = _share(mask)
         rows, columns = np.flatnonzero(share.any(axis=1)), np.flatnonzero(share.any(axis=0))
         if not len(rows):
             return
@@ -130,13 +130,14 @@ class _Canvas:
 
     def shade(self, mask: Mask | Image, change: float) -> None:
         """Lighten, or darken, the picture where a mask says how much."""
-        share = np.asarray(mask, np.float32) * np.float32(1 / 255 if mask.dtype == np.uint8 else 1)
+        share = _share(mask)
         self.image += (change * share)[..., None]
 
 
-def _share(mask: Mask, strength: float = 1.0) -> Image:
-    """Turn a mask into the part that what lies beneath gives up."""
-    return mask.astype(np.float32) * np.float32(strength / 255)
+def _share(mask: Mask | Image, strength: float = 1.0) -> Image:
+    """Turn a mask, up to 255 or as a share already, into the part that what lies beneath gives up."""
+    whole = 255.0 if mask.dtype == np.uint8 else 1.0
+    return np.asarray(mask * np.float32(strength / whole), np.float32)
 
 
 def _paint_land(canvas: _Canvas, parcels: Sequence[Parcel]) -> None:

@@ -97,7 +97,8 @@ def test_red_lights_hold_the_traffic_and_green_ones_let_it_go():
             before, now = last.get(each.number, each.s), each.s
             last[each.number] = now
             nose = each.driver.LENGTH / 2
-            if before + nose < line <= now + nose:
+            # Those who were put near the line at the beginning had no time to see the light.
+            if tick > 60 and before + nose < line <= now + nose:
                 # Only who could not stop any more drives over the line, soon after it has turned red.
                 assert index in green or index in recent
                 crossed_on_green += index in green
