@@ -217,7 +217,7 @@ class BackgroundModel:
         self._factor *= one - rate
         self._p_b += rate * (background - self._p_b)
         if self._conditional:
-            self._factor_shared[background] *= one - rate
+            self._factor_shared *= np.where(background, one - rate, one)
             grow_shared = background * (rate / self._factor_shared)
         else:
             grow_shared = background * (rate / self._factor)

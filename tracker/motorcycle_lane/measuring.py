@@ -257,19 +257,21 @@ class Measurer:
         tables = _tell_apart(expected.references[tracks])
         shares = silhouettes.place(shape, owner, number, bins, centres, sizes, tables, SWEEPS)
         if self.sizes.known(np.array([0.5 * (box[1] + box[3])]))[0]:
-            lines = self.sizes.sizes(np.array([0.0, self._frame[1]]))
-            offsets, slopes = lines[0], (lines[1] - lines[0]) / self._frame[1]
-            window = self._window(box)
-            for _ in range(MOST_ADDED):
-                worth, x, y = silhouettes.unexplained(
-                    shape, owner, number, window, centres, sizes, offsets, slopes
-                )
-                if worth < LEAST_WORTH:
-                    break
-                centres = np.concatenate([centres, [[x, y]]])
-                sizes = np.concatenate([sizes, self.sizes.sizes(np.array([y]))])
-                tables = np.concatenate([tables, np.zeros((1, *tables.shape[1:]))])
-            if len(centres) > len(tracks):
+            more = silhouettes.unexplained(
+                shape,
+                owner,
+                number,
+                self._window(box),
+                centres,
+                sizes,
+                *self.sizes.line,
+                LEAST_WORTH,
+                MOST_ADDED,
+            )
+            if len(more):
+                centres = np.concatenate([centres, more[:, 1:]])
+                sizes = np.concatenate([sizes, self.sizes.sizes(more[:, 2])])
+                tables = np.concatenate([tables, np.zeros((len(more), *tables.shape[1:]))])
                 shares = silhouettes.place(shape, owner, number, bins, centres, sizes, tables, SWEEPS)
         histograms = silhouettes.colours(shape, owner, number, bins, centres, sizes, colour.BINS)
         seen = shares >= LEAST_SEEN

@@ -81,6 +81,14 @@ def darkness(image, background, mask):  # type: ignore[no-untyped-def]
     return found
 
 
+def _histogram(ratios: NDArray[np.float32], tints: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Return BINS counts of pixels (K,) by darkness and tint."""
+    row = ((ratios - DARKEST) * (BINS[0] / (BRIGHTEST - DARKEST))).astype(np.intp)
+    column = ((tints - REDDEST) * (BINS[1] / (BLUEST - REDDEST))).astype(np.intp)
+    at = np.minimum(row, BINS[0] - 1) * BINS[1] + np.minimum(column, BINS[1] - 1)
+    return np.bincount(at, minlength=BINS[0] * BINS[1]).reshape(BINS)
+
+
 class Shadows:
     """Takes the cast shadows of one scene out of its foreground."""
 
@@ -100,16 +108,13 @@ class Shadows:
         at = np.nonzero(mask)
         ratios, tints, spread = darkness(image, background, mask)[at].T
         likely = (ratios > 0.0) & (spread < UNEVEN)
-        counts, dark_edges, tint_edges = np.histogram2d(
-            ratios[likely], tints[likely], BINS, ((DARKEST, BRIGHTEST), (REDDEST, BLUEST))
-        )
-        self._counts = FADING * self._counts + counts
+        self._counts = FADING * self._counts + _histogram(ratios[likely], tints[likely])
         if not self._counts.any():
             return mask
         smooth = cv2.blur(self._counts, (3, 3), borderType=cv2.BORDER_CONSTANT)
         i, j = np.unravel_index(smooth.argmax(), smooth.shape)
-        dark = 0.5 * (dark_edges[i] + dark_edges[i + 1])
-        tint = 0.5 * (tint_edges[j] + tint_edges[j + 1])
+        dark = DARKEST + (i + 0.5) / BINS[0] * (BRIGHTEST - DARKEST)
+        tint = REDDEST + (j + 0.5) / BINS[1] * (BLUEST - REDDEST)
         # A rim has less of both: a part of the sun still shines there.
         expected = tint * (1.0 - ratios) / (1.0 - dark)
         dim = (ratios > dark - DARKER) & (np.abs(tints - expected) < OFF_TINT)

@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.motorcycle_lane.sizes import SMALLEST
+
 Floats = NDArray[np.float64]
 
 ROWS, COLUMNS = 24, 12
@@ -54,6 +56,26 @@ def _cover(shape, x, y, centre, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _cells(start, stop, stride, centre, size, cells):  # type: ignore[no-untyped-def]
+    """Return the first pixel of a row or column, from ``start``, in a silhouette, and the cells of all there.
+
+    The same as `_cover` reads, for one axis at once.
+    """
+    first, count = start, 0
+    found = np.empty(max(stop - start, 0) // stride + 1, np.int64)
+    for pixel in range(start, stop, stride):
+        u = (pixel + 0.5 - centre) / size + 0.5
+        if u >= 1.0:
+            break
+        if u < 0.0:
+            first = pixel + stride
+            continue
+        found[count] = int(u * cells)
+        count += 1
+    return first, found[:count]
+
+
+@njit(cache=True)
 def _gains(shape, groups, group, bins, centres, sizes, k, table, x0, y0, across, down):  # type: ignore[no-untyped-def]
     """Return what each pixel of a window is worth to silhouette k, given where the others stand.
 
@@ -68,20 +90,18 @@ def _gains(shape, groups, group, bins, centres, sizes, k, table, x0, y0, across,
         if n == k:
             continue
         nearer = centres[n, 1] + 0.5 * sizes[n, 1] > foot
-        left, top = (
-            int(np.floor(centres[n, 0] - 0.5 * sizes[n, 0])),
-            int(np.floor(centres[n, 1] - 0.5 * sizes[n, 1])),
-        )
-        right, bottom = (
-            int(np.ceil(centres[n, 0] + 0.5 * sizes[n, 0])),
-            int(np.ceil(centres[n, 1] + 0.5 * sizes[n, 1])),
-        )
-        for y in range(max(top, y0), min(bottom, y0 + down)):
-            for x in range(max(left, x0), min(right, x0 + across)):
-                rest = 1.0 - _cover(shape, x, y, centres[n], sizes[n])
-                free[y - y0, x - x0] *= rest
+        left, right = centres[n, 0] - 0.5 * sizes[n, 0], centres[n, 0] + 0.5 * sizes[n, 0]
+        top, bottom = centres[n, 1] - 0.5 * sizes[n, 1], centres[n, 1] + 0.5 * sizes[n, 1]
+        start, stop = max(int(np.floor(left)), x0), min(int(np.ceil(right)), x0 + across)
+        first_x, columns = _cells(start, stop, 1, centres[n, 0], sizes[n, 0], shape.shape[1])
+        start, stop = max(int(np.floor(top)), y0), min(int(np.ceil(bottom)), y0 + down)
+        first_y, rows = _cells(start, stop, 1, centres[n, 1], sizes[n, 1], shape.shape[0])
+        for i in range(rows.size):
+            for j in range(columns.size):
+                rest = 1.0 - shape[rows[i], columns[j]]
+                free[first_y - y0 + i, first_x - x0 + j] *= rest
                 if nearer:
-                    shown[y - y0, x - x0] *= rest
+                    shown[first_y - y0 + i, first_x - x0 + j] *= rest
     upper, lower = np.zeros((down, across)), np.zeros((down, across))
     for i in range(down):
         for j in range(across):
@@ -102,10 +122,15 @@ def _mean(shape, upper, lower, x0, y0, place, size, stride):  # type: ignore[no-
     down, across = upper.shape
     total, value = 1e-9, 0.0
     left, top = int(np.floor(place[0] - 0.5 * size[0])), int(np.floor(place[1] - 0.5 * size[1]))
-    for y in range(top, int(np.ceil(place[1] + 0.5 * size[1])), stride):
+    right, bottom = int(np.ceil(place[0] + 0.5 * size[0])), int(np.ceil(place[1] + 0.5 * size[1]))
+    first_x, columns = _cells(left, right, stride, place[0], size[0], shape.shape[1])
+    first_y, rows = _cells(top, bottom, stride, place[1], size[1], shape.shape[0])
+    for i in range(rows.size):
+        y = first_y + i * stride
         half = upper if y + 0.5 < place[1] else lower
-        for x in range(left, int(np.ceil(place[0] + 0.5 * size[0])), stride):
-            covered = _cover(shape, x, y, place, size)
+        for j in range(columns.size):
+            x = first_x + j * stride
+            covered = shape[rows[i], columns[j]]
             total += covered
             if x0 <= x < x0 + across and y0 <= y < y0 + down:
                 value += covered * half[y - y0, x - x0]
@@ -147,25 +172,29 @@ def place(shape, groups, group, bins, centres, sizes, tables, sweeps):  # type: 
             upper, lower, _ = _gains(
                 shape, groups, group, bins, centres, sizes, k, tables[k], x0, y0, across, down
             )
-            start_x, start_y, step, best = centres[k, 0], centres[k, 1], 2.0, -np.inf
+            # Moves are whole pixels: what was tried once is not better the second time.
+            span, step, best = int(reach), 2, -np.inf
+            tried = np.zeros((2 * span + 1, 2 * span + 1), np.bool_)
+            start_x, start_y, at_x, at_y = centres[k, 0], centres[k, 1], 0, 0
             while True:
-                origin_x, origin_y, better = centres[k, 0], centres[k, 1], False
+                from_x, from_y, better = at_x, at_y, False
                 for move in range(9):
-                    trial[0] = origin_x + step * (move % 3 - 1)
-                    trial[1] = origin_y + step * (move // 3 - 1)
-                    if max(abs(trial[0] - start_x), abs(trial[1] - start_y)) > reach:
+                    dx, dy = from_x + step * (move % 3 - 1), from_y + step * (move // 3 - 1)
+                    if max(abs(dx), abs(dy)) > span or tried[span + dy, span + dx]:
                         continue
+                    tried[span + dy, span + dx] = True
+                    trial[0], trial[1] = start_x + dx, start_y + dy
                     off = ((trial[0] - expected[k, 0]) / size[0]) ** 2 + (
                         (trial[1] - expected[k, 1]) / size[1]
                     ) ** 2
                     value = _mean(shape, upper, lower, x0, y0, trial, size, stride) - PULL * off
                     if value > best + 1e-9:
-                        best, better = value, True
-                        centres[k, 0], centres[k, 1] = trial[0], trial[1]
+                        best, better, at_x, at_y = value, True, dx, dy
                 if not better:
-                    if step == 1.0:
+                    if step == 1:
                         break
-                    step = 1.0
+                    step = 1
+            centres[k, 0], centres[k, 1] = start_x + at_x, start_y + at_y
     for k in range(count):
         x0, y0, across, down = _window(centres[k], sizes[k], 0.0)
         _, _, shown = _gains(shape, groups, group, bins, centres, sizes, k, tables[k], x0, y0, across, down)
@@ -174,8 +203,41 @@ def place(shape, groups, group, bins, centres, sizes, tables, sweeps):  # type: 
 
 
 @njit(cache=True)
-def unexplained(shape, groups, group, window, centres, sizes, offsets, slopes):  # type: ignore[no-untyped-def]
-    """Look for the place where one more silhouette would explain most of a group.
+def _claim(shape, gain, left, top, centre, size):  # type: ignore[no-untyped-def]
+    """Take what a silhouette explains from the foreground in ``gain``, whose first pixel is left, top."""
+    low_x, low_y = int(centre[0] - 0.5 * size[0]), int(centre[1] - 0.5 * size[1])
+    high_x, high_y = int(centre[0] + 0.5 * size[0]) + 1, int(centre[1] + 0.5 * size[1]) + 1
+    for y in range(max(low_y, top), min(high_y, top + gain.shape[0])):
+        for x in range(max(low_x, left), min(high_x, left + gain.shape[1])):
+            if gain[y - top, x - left] > 0.0:
+                gain[y - top, x - left] *= 1.0 - _cover(shape, x, y, centre, size)
+
+
+@njit(cache=True)
+def _worth(shape, gain, left, top, centre, size):  # type: ignore[no-untyped-def]
+    """Return how well a silhouette would explain what is left in ``gain``."""
+    stride = 3 if size[0] >= 18.0 else 2
+    total, value = 1e-9, 0.0
+    low_x, low_y = int(centre[0] - 0.5 * size[0]), int(centre[1] - 0.5 * size[1])
+    high_x, high_y = int(centre[0] + 0.5 * size[0]) + 1, int(centre[1] + 0.5 * size[1]) + 1
+    first_x, columns = _cells(low_x, high_x, stride, centre[0], size[0], shape.shape[1])
+    first_y, rows = _cells(low_y, high_y, stride, centre[1], size[1], shape.shape[0])
+    for i in range(rows.size):
+        y = first_y - top + i * stride
+        for j in range(columns.size):
+            x = first_x - left + j * stride
+            covered = shape[rows[i], columns[j]]
+            total += covered
+            if 0 <= y < gain.shape[0] and 0 <= x < gain.shape[1]:
+                value += covered * gain[y, x]
+    return value / total
+
+
+@njit(cache=True)
+def unexplained(  # type: ignore[no-untyped-def]
+    shape, groups, group, window, centres, sizes, offsets, slopes, least, most
+):
+    """Look for the places where more silhouettes would explain most of a group, one after another.
 
     Args:
         shape: (ROWS, COLUMNS) of a silhouette.
@@ -186,9 +248,11 @@ def unexplained(shape, groups, group, window, centres, sizes, offsets, slopes): 
         sizes: (K, 2) of those.
         offsets: (2,) width and height of one at row 0.
         slopes: (2,) by how much they grow a row.
+        least: Worth of which one must be to be found.
+        most: How many are looked for.
 
     Returns:
-        Its worth, at most 1, and its centre x, y.
+        (N, 3), N <= most: the worth of each, at most 1, given those before, and its centre x, y.
     """
     height, width = groups.shape
     x0, y0, x1, y1 = window
@@ -203,37 +267,37 @@ def unexplained(shape, groups, group, window, centres, sizes, offsets, slopes): 
             elif groups[y, x] == 0:
                 gain[y - top, x - left] = -ON_BACKGROUND
     for k in range(centres.shape[0]):
-        for y in range(
-            max(int(centres[k, 1] - 0.5 * sizes[k, 1]), top),
-            min(int(centres[k, 1] + 0.5 * sizes[k, 1]) + 1, bottom),
-        ):
-            for x in range(
-                max(int(centres[k, 0] - 0.5 * sizes[k, 0]), left),
-                min(int(centres[k, 0] + 0.5 * sizes[k, 0]) + 1, right),
-            ):
-                if groups[y, x] == group:
-                    gain[y - top, x - left] *= 1.0 - _cover(shape, x, y, centres[k], sizes[k])
-    best, best_x, best_y = -1.0, 0.5 * (x0 + x1), 0.5 * (y0 + y1)
-    centre, size = np.empty(2), np.empty(2)
+        _claim(shape, gain, left, top, centres[k], sizes[k])
     step = max(2.0, 0.12 * (offsets[0] + slopes[0] * 0.5 * (y0 + y1)))
     rows = max(1, int((y1 - y0) / step) + 1)
     columns = max(1, int((x1 - x0) / step) + 1)
-    for i in range(rows):
-        for j in range(columns):
-            centre[0], centre[1] = x0 + step * j, y0 + step * i
+    worths = np.empty((rows, columns))
+    found = np.empty((most, 3))
+    centre, size, new, new_size = np.empty(2), np.empty(2), np.empty(2), np.empty(2)
+    for n in range(most):
+        best = -np.inf
+        for i in range(rows):
+            centre[1] = y0 + step * i
             for c in range(2):
-                size[c] = max(offsets[c] + slopes[c] * centre[1], 4.0)
-            total, value = 1e-9, 0.0
-            stride = 3 if size[0] >= 18.0 else 2
-            for y in range(int(centre[1] - 0.5 * size[1]), int(centre[1] + 0.5 * size[1]) + 1, stride):
-                for x in range(int(centre[0] - 0.5 * size[0]), int(centre[0] + 0.5 * size[0]) + 1, stride):
-                    covered = _cover(shape, x, y, centre, size)
-                    total += covered
-                    if top <= y < bottom and left <= x < right:
-                        value += covered * gain[y - top, x - left]
-            if value / total > best:
-                best, best_x, best_y = value / total, centre[0], centre[1]
-    return best, best_x, best_y
+                size[c] = max(offsets[c] + slopes[c] * centre[1], SMALLEST)
+            for j in range(columns):
+                centre[0] = x0 + step * j
+                # Only what the last one that was found reaches is worth another now.
+                if n == 0 or (
+                    abs(centre[0] - new[0]) < 0.5 * (size[0] + new_size[0]) + 1.0
+                    and abs(centre[1] - new[1]) < 0.5 * (size[1] + new_size[1]) + 1.0
+                ):
+                    worths[i, j] = _worth(shape, gain, left, top, centre, size)
+                if worths[i, j] > best:
+                    best = worths[i, j]
+                    found[n, 0], found[n, 1], found[n, 2] = best, centre[0], centre[1]
+        if best < least:
+            return found[:n]
+        new[0], new[1] = found[n, 1], found[n, 2]
+        for c in range(2):
+            new_size[c] = max(offsets[c] + slopes[c] * new[1], SMALLEST)
+        _claim(shape, gain, left, top, new, new_size)
+    return found
 
 
 @njit(cache=True)

@@ -53,9 +53,16 @@ class SizeModel:
 
     def sizes(self, rows: Floats) -> Floats:
         """Return (N, 2) width and height, px, of riders whose centres lie at ``rows`` (N,)."""
-        if np.isfinite(self._limits).all():
-            rows = np.clip(rows, *self._limits)
+        low, high = self._limits
+        if low <= high:
+            rows = np.minimum(np.maximum(rows, low), high)
         return np.asarray(np.maximum(self._lines[0] + self._lines[1] * rows[:, None] / self._scale, SMALLEST))
+
+    @property
+    def line(self) -> tuple[Floats, Floats]:
+        """(2,) width and height at row 0, px, and (2,) by how much they grow a row down the picture."""
+        top, bottom = self.sizes(np.array([0.0, self._scale]))
+        return top, (bottom - top) / self._scale
 
     def learn(self, rows: Floats, sizes: Floats) -> None:
         """Take in the regions of a frame that moved.

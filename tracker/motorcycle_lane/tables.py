@@ -96,6 +96,31 @@ def same(kind, a, b, tolerance, floor):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def all_same(kind, entries, features, tolerance, floor):  # type: ignore[no-untyped-def]
+    """Tell of (P,) pairs of features what `same` tells of one."""
+    count = features.size
+    found = np.empty(count, np.bool_)
+    if kind == PAIR:
+        for i in range(count):
+            a, b = entries[i], features[i]
+            early = _near(a & LANES, b & LANES, tolerance)
+            found[i] = early & _near((a >> np.uint32(5)) & LANES, (b >> np.uint32(5)) & LANES, tolerance)
+        return found
+    # Whole numbers below 2^24: float32 holds them as they are.
+    a, b, noise = entries.view(np.uint8), features.view(np.uint8), floor * floor
+    middle = np.float32(128.0 if kind == GRADIENT else 0.0)
+    third = np.float32(0.0 if kind == GRADIENT else 1.0)
+    for i in range(count):
+        p0, q0 = np.float32(a[4 * i]) - middle, np.float32(b[4 * i]) - middle
+        p1, q1 = np.float32(a[4 * i + 1]) - middle, np.float32(b[4 * i + 1]) - middle
+        p2, q2 = np.float32(a[4 * i + 2]) * third, np.float32(b[4 * i + 2]) * third
+        apart = (p0 - q0) * (p0 - q0) + (p1 - q1) * (p1 - q1) + (p2 - q2) * (p2 - q2)
+        size = p0 * p0 + q0 * q0 + p1 * p1 + q1 * q1 + p2 * p2 + q2 * q2
+        found[i] = (apart <= tolerance * size) | (apart <= noise)
+    return found
+
+
+@njit(cache=True)
 def evidence(kind, table, features, at, first, tolerance, floor):  # type: ignore[no-untyped-def]
     """Sum p(v) and p(v|b) over the first N entries that are identified with a feature: eqs. (15), (16).
 
@@ -156,13 +181,16 @@ def learn(kind, table, features, grow, grow_shared, tolerance, floor):  # type: 
         floor: As in `same`.
     """
     entries, frequency, shared_frequency = table.features, table.seen, table.shared
-    last = entries.shape[0] - 1
+    last, nothing = entries.shape[0] - 1, np.float32(0.0)
+    # Nearly all pixels show their first entry: that is told, and counted, without a branch.
+    usual = all_same(kind, entries[0], features, tolerance, floor)
     for i in range(features.size):
-        feature = features[i]
-        if same(kind, entries[0, i], feature, tolerance, floor):
-            frequency[0, i] += grow
-            shared_frequency[0, i] += grow_shared[i]
+        frequency[0, i] += grow if usual[i] else nothing
+        shared_frequency[0, i] += grow_shared[i] if usual[i] else nothing
+    for i in range(features.size):
+        if usual[i]:
             continue
+        feature = features[i]
         k, known = 1, False
         while frequency[k, i] > 0.0:
             known = same(kind, entries[k, i], feature, tolerance, floor)

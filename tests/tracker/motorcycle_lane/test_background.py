@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tests.tracker.motorcycle_lane.twin import PlainModel, plain_corner
 from tracker.motorcycle_lane.background import PAPER, BackgroundModel, BackgroundParameters, StatMode
 from tracker.motorcycle_lane.change import corner
-from tracker.motorcycle_lane.tables import COLOUR, GRADIENT, PAIR, Table, evidence, learn, same
+from tracker.motorcycle_lane.tables import COLOUR, GRADIENT, PAIR, Table, all_same, evidence, learn, same
 
 MODES = list(StatMode)
 
@@ -104,6 +104,20 @@ def test_features_are_the_same_within_their_distance(seed, tolerance):
         apart = 1 - 2 * (a @ b) / max(a @ a + b @ b, 1)
         wanted = bool(apart <= 0.005 or ((a - b) ** 2).sum() <= 10**2)
         assert same(kind, pack(kind, a), pack(kind, b), 0.005, 10.0) == wanted
+
+
+@given(seed=st.integers(0, 10_000), kind=st.sampled_from((COLOUR, GRADIENT, PAIR)))
+@settings(max_examples=60, deadline=None)
+def test_many_features_are_the_same_as_one_by_one(seed, kind):
+    rng = np.random.default_rng(seed)
+    count, high = {COLOUR: (3, 256), GRADIENT: (2, 256), PAIR: (6, 32)}[kind]
+    a = rng.integers(0, high, (50, count))
+    b = np.clip(a + rng.integers(-12, 13, a.shape) // rng.integers(1, 8), 0, high - 1)
+    bits = 1 << ((5 if kind == PAIR else 8) * np.arange(count))
+    a, b = (a @ bits).astype(np.uint32), (b @ bits).astype(np.uint32)
+    tolerance, floor = (2, 0.0) if kind == PAIR else (rng.uniform(0.0, 0.02), rng.uniform(0.0, 12.0))
+    wanted = [same(kind, p, q, tolerance, floor) for p, q in zip(a, b, strict=True)]
+    assert all_same(kind, a, b, tolerance, floor).tolist() == wanted
 
 
 def test_gain_that_eq_8_takes_for_the_same_colour():

@@ -128,15 +128,11 @@ def test_silhouettes_find_their_riders_in_one_region():
 def test_a_rider_that_nobody_expects_is_found_beside_one_that_is():
     shape, groups, _, truth, sizes, _ = joined_pair((14.0, 2.0))
     window = np.array([30.0, 30.0, 65.0, 55.0])
-    worth, x, y = silhouettes.unexplained(
-        shape, groups, 1, window, truth[:1], sizes[:1], np.array([16.0, 36.0]), np.zeros(2)
-    )
+    line = np.array([16.0, 36.0]), np.zeros(2)
+    ((worth, x, y),) = silhouettes.unexplained(shape, groups, 1, window, truth[:1], sizes[:1], *line, 0.45, 4)
     assert worth > 0.6
     assert np.hypot(x - truth[1, 0], y - truth[1, 1]) < 4.0
-    worth, _, _ = silhouettes.unexplained(
-        shape, groups, 1, window, truth, sizes, np.array([16.0, 36.0]), np.zeros(2)
-    )
-    assert worth < 0.2
+    assert not len(silhouettes.unexplained(shape, groups, 1, window, truth, sizes, *line, 0.2, 4))
 
 
 def test_shadows_are_taken_out_and_dark_clothes_are_not():
