@@ -40,8 +40,9 @@ def changed(folder, tmp_path, key, value):
     inner = document
     for table in tables:
         inner = inner[int(table)] if table.isdecimal() else inner[table]
-    assert inner[last] != value
-    inner[last] = value
+    place = int(last) if last.isdecimal() else last
+    assert inner[place] != value
+    inner[place] = value
     (tmp_path / "manifest.json").write_text(json.dumps(document))
     return tmp_path / "manifest.json"
 
