@@ -175,7 +175,7 @@ class DaskCluster:
 
         tasks = {self._client.submit(_alone, work, seed, pure=False): seed for seed in seeds}
         try:
-            for task in ready(tasks):
+            for task in ready(tasks, loop=self._client.loop):
                 yield tasks[task], task.result()
                 if progress is not None:
                     progress(frames)

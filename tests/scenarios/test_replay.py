@@ -36,12 +36,13 @@ def folder(tmp_path_factory, gl):
 def changed(folder, tmp_path, key, value):
     """The manifest with one parameter changed: a path of keys with dots."""
     document = json.loads((folder / "manifest.json").read_text())
-    *tables, last = (int(part) if part.isdecimal() else part for part in key.split("."))
+    *tables, last = key.split(".")
     inner = document
     for table in tables:
-        inner = inner[table]
-    assert inner[last] != value
-    inner[last] = value
+        inner = inner[int(table)] if table.isdecimal() else inner[table]
+    place = int(last) if last.isdecimal() else last
+    assert inner[place] != value
+    inner[place] = value
     (tmp_path / "manifest.json").write_text(json.dumps(document))
     return tmp_path / "manifest.json"
 
