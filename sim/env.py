@@ -154,7 +154,7 @@ class SceneEnv(gymnasium.Env[Image, Action]):
         truncated = self.observation.tick >= self.course.frames - 1
         return image, 0.0, self._simulation.scene.over, truncated, info
 
-    def render(self) -> Image | None:  # type: ignore[override]
+    def render(self) -> Image | None:
         """Return the last frame, where the render mode is "rgb_array"."""
         return self.observation.image.copy() if self.render_mode == "rgb_array" else None
 
