@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import gymnasium
+from gymnasium.utils import RecordConstructorArgs
 
 from scenarios import bridge
 from scenarios.detections import Fed, make_fed
@@ -19,7 +20,7 @@ from tracker.base import Tracker
 from tracker.types import Tracks
 
 
-class TrackerInTheLoop(gymnasium.Wrapper[Image, Action, Image, Action]):
+class TrackerInTheLoop(gymnasium.Wrapper[Image, Action, Image, Action], RecordConstructorArgs):
     """Runs a tracker on every frame that an environment shows.
 
     ``info["tracks"]`` holds the tracks. The reward of a frame is the F1 of its confirmed boxes against its
@@ -48,7 +49,8 @@ class TrackerInTheLoop(gymnasium.Wrapper[Image, Action, Image, Action]):
         boxes: Boxes = "amodal",
         params: ScoringParams | None = None,
     ) -> None:
-        super().__init__(env)
+        RecordConstructorArgs.__init__(self, tracker=tracker, odometry=odometry, boxes=boxes, params=params)
+        gymnasium.Wrapper.__init__(self, env)
         scene = env.unwrapped
         if not isinstance(scene, SceneEnv):
             raise TypeError(f"{env} is none of testtrack's environments")

@@ -72,8 +72,9 @@ class Jpda:
         return self._ids.setdefault(name, len(self._ids) + 1)
 
     def _shown(self, found: list[Any]) -> Tracks:
-        means = np.array([np.asarray(t.state_vector, float).ravel() for t in found]).reshape(-1, 6)
-        covariances = np.array([np.asarray(t.covar, float) for t in found]).reshape(-1, 6, 6)
+        # It sums over sets, in no fixed order: what that changes is rounded away.
+        means = np.array([np.asarray(t.state_vector, float).ravel() for t in found]).reshape(-1, 6).round(6)
+        covariances = np.array([np.asarray(t.covar, float) for t in found]).reshape(-1, 6, 6).round(6)
         centres, half = means[:, [0, 2]], np.maximum(means[:, _SIZE], 1.0) / 2
         update = self._part["types.update"].Update
         seen = np.array([isinstance(t.state, update) for t in found], bool)
