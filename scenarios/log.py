@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from scenarios.files import moved_in
 from scenarios.shown import ShownLog, from_arrays, to_arrays
-from sim.truth.types import FrameTruth
+from sim.truth.types import AerialTruth, FrameTruth
 from tracker.types import Tracks
 
 
@@ -99,6 +99,8 @@ class EpisodeLog:
 _FORMAT = "testtrack episode 2"
 _PLAIN = ("scenario", "scene", "spec_id", "seed", "tracker", "rate", "width", "height", "has_boxes", "hashes")
 _TRUTH_ARRAYS = tuple(f.name for f in fields(FrameTruth) if f.name != "tick")
+_ALOFT_ARRAYS = tuple(f.name for f in fields(AerialTruth) if f.name not in (*_TRUTH_ARRAYS, "tick"))
+_A_FRAME = ("ground_to_image",)  # one of these a frame, of the others a row for each vehicle
 _TRACK_ARRAYS = ("ids", "boxes", "status")
 _OPTIONAL_TRACK_ARRAYS = {"score": (), "state": (4,), "covariance": (4, 4)}
 
@@ -122,8 +124,10 @@ def save(log: EpisodeLog, path: Path | str) -> None:
         "tracks/rows": np.array([len(frame) for frame in log.tracks], np.int64),
     }
     if log.truth:
-        for name in _TRUTH_ARRAYS:
-            arrays[f"truth/{name}"] = np.concatenate([getattr(frame, name) for frame in log.truth])
+        aloft = isinstance(log.truth[0], AerialTruth)
+        for name in (*_TRUTH_ARRAYS, *(_ALOFT_ARRAYS if aloft else ())):
+            join = np.stack if name in _A_FRAME else np.concatenate
+            arrays[f"truth/{name}"] = join([getattr(frame, name) for frame in log.truth])
     if log.tracks:
         for name in _TRACK_ARRAYS:
             arrays[f"tracks/{name}"] = np.concatenate([getattr(frame, name) for frame in log.tracks])
@@ -173,9 +177,17 @@ def _read(arrays: Mapping[str, NDArray[Any]]) -> EpisodeLog:
     truth: list[FrameTruth] = []
     tracks: list[Tracks] = []
     if len(ticks):
-        columns = {name: _split(arrays[f"truth/{name}"], arrays["truth/rows"]) for name in _TRUTH_ARRAYS}
+        aloft = f"truth/{_ALOFT_ARRAYS[0]}" in arrays
+        columns: dict[str, Any] = {
+            name: arrays[f"truth/{name}"]
+            if name in _A_FRAME
+            else _split(arrays[f"truth/{name}"], arrays["truth/rows"])
+            for name in (*_TRUTH_ARRAYS, *(_ALOFT_ARRAYS if aloft else ()))
+        }
         truth = [
-            FrameTruth(tick=int(tick), **{name: column[k] for name, column in columns.items()})
+            (AerialTruth if aloft else FrameTruth)(
+                tick=int(tick), **{name: column[k] for name, column in columns.items()}
+            )
             for k, tick in enumerate(ticks)
         ]
         required = {name: _split(arrays[f"tracks/{name}"], track_rows) for name in _TRACK_ARRAYS}

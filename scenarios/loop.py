@@ -15,7 +15,7 @@ from scenarios import bridge
 from scenarios.log import EpisodeLog, TraceLog
 from scenarios.shown import ShownRows
 from scenarios.spec import Scenario, spec_id
-from sim.params import InCarParams
+from sim.params import AerialParams, InCarParams
 from tracker.base import Tracker
 from tracker.types import Diagnostics, Frame, Info, Traces, Tracks
 
@@ -70,11 +70,14 @@ def run_episode(
 def make_scene(scenario: Scenario, seed: int) -> Scene:
     """Populate the world of a scenario for one seed."""
     # With the traffic and the meshes: heavy.
+    from sim.scenes.aerial import AerialScene
     from sim.scenes.in_car import InCarScene
     from sim.scenes.motorcycle_lane import MotorcycleLaneScene
 
     if isinstance(scenario.params, InCarParams):
         return InCarScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
+    if isinstance(scenario.params, AerialParams):
+        return AerialScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
     return MotorcycleLaneScene(scenario.params, seed=seed, rate=scenario.rate)
 
 

@@ -17,11 +17,11 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, Val
 from pydantic_core import ErrorDetails
 
 from scenarios.errors import InputError
-from sim.params import InCarParams, MotorcycleLaneParams, Params
+from sim.params import AerialParams, InCarParams, MotorcycleLaneParams, Params, TrafficParams
 
 Seconds = Annotated[FiniteFloat, Field(gt=0, le=3600)]
 Rate = Annotated[int, Field(ge=1, le=240)]
-SceneName = Literal["in-car", "motorcycle-lane"]
+SceneName = Literal["in-car", "aerial", "motorcycle-lane"]
 
 _BARE_WORD = re.compile(r"[A-Za-z][\w-]*")
 _KEY = re.compile(r"[A-Za-z_][\w-]*(\.[A-Za-z_][\w-]*)*")
@@ -48,7 +48,7 @@ class Scenario(Params):
     scene: SceneName
     seconds: Seconds = 20.0
     rate: Rate = 30
-    params: InCarParams | MotorcycleLaneParams
+    params: InCarParams | AerialParams | MotorcycleLaneParams
 
     @property
     def frames(self) -> int:
@@ -62,6 +62,17 @@ class InCarFile(InCarParams):
     model_config = ConfigDict(title="testtrack scenario")
 
     scene: Literal["in-car"]
+    description: str = ""
+    seconds: Seconds = 20.0
+    rate: Rate = 30
+
+
+class AerialFile(AerialParams):
+    """The layout of a scenario file of the aerial scene: these keys, then the scene's tables."""
+
+    model_config = ConfigDict(title="testtrack scenario")
+
+    scene: Literal["aerial"]
     description: str = ""
     seconds: Seconds = 20.0
     rate: Rate = 30
@@ -82,12 +93,13 @@ class MotorcycleLaneFile(MotorcycleLaneParams):
 class _Layout:
     """How the scenarios of one scene are written down: the whole file, and the scene's tables in it."""
 
-    file: type[InCarFile] | type[MotorcycleLaneFile]
-    params: type[InCarParams] | type[MotorcycleLaneParams]
+    file: type[InCarFile] | type[AerialFile] | type[MotorcycleLaneFile]
+    params: type[InCarParams] | type[AerialParams] | type[MotorcycleLaneParams]
 
 
 _LAYOUTS: dict[str, _Layout] = {
     "in-car": _Layout(InCarFile, InCarParams),
+    "aerial": _Layout(AerialFile, AerialParams),
     "motorcycle-lane": _Layout(MotorcycleLaneFile, MotorcycleLaneParams),
 }
 
@@ -129,6 +141,8 @@ def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         raise SpecError(_explain(error.errors()[0], where, set_by, layout)) from error
     if isinstance(checked, InCarFile):
         _check_together(checked, where)
+    if not isinstance(checked, MotorcycleLaneFile):
+        _check_shares(checked.traffic, where)
     sections = {field: getattr(checked, field) for field in layout.params.model_fields}
     return Scenario(
         name=name,
@@ -150,7 +164,7 @@ def spec_id(scenario: Scenario) -> str:
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON schema of a scenario file, for editors that complete and check TOML."""
-    file = Annotated[InCarFile | MotorcycleLaneFile, Field(discriminator="scene")]
+    file = Annotated[InCarFile | AerialFile | MotorcycleLaneFile, Field(discriminator="scene")]
     return {"title": "testtrack scenario"} | TypeAdapter[Any](file).json_schema()
 
 
@@ -276,7 +290,7 @@ def _short(value: Any) -> str:
 
 def _check_together(checked: InCarFile, where: str) -> None:
     """Refuse values that are right one by one and make no sense together."""
-    road, traffic = checked.road, checked.traffic
+    road = checked.road
     if road.min_radius > road.max_radius:
         raise SpecError(
             f"{where}: road.min_radius is {road.min_radius:g}: "
@@ -287,6 +301,10 @@ def _check_together(checked: InCarFile, where: str) -> None:
             f"{where}: ego.lane is {checked.ego.lane}: "
             f"wanted less than road.lanes, {road.lanes}, or -1 for any"
         )
+
+
+def _check_shares(traffic: TrafficParams, where: str) -> None:
+    """Refuse shares of kinds of vehicles that add up to more than all of them."""
     if (others := traffic.vans + traffic.lorries + traffic.buses) > 1:
         raise SpecError(f"{where}: traffic.vans + lorries + buses is {others:g}: wanted at most 1")
 

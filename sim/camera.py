@@ -86,6 +86,17 @@ def project(camera: Camera, pose: Pose, points: ArrayLike) -> tuple[Floats, Floa
     return np.where(depth[..., None] > 0, pixels, np.nan), depth
 
 
+def ground_homography(camera: Camera, pose: Pose) -> Floats:
+    """Return the homography (3, 3) from the ground plane, world x and y in metres, to pixels.
+
+    Its third row gives the depth along the axis in metres, so that its scale is fixed. The product of one
+    pose's with the inverse of another's is what takes the first picture of the ground into the second.
+    """
+    intrinsics = np.array([[camera.focal, 0, camera.cx], [0, camera.focal, camera.cy], [0, 0, 1.0]])
+    plane = np.column_stack([pose.rotation[:, :2], -pose.rotation @ pose.position])
+    return np.asarray(intrinsics @ plane)
+
+
 def image_motion(
     focal: float, x: ArrayLike, depth: ArrayLike, t_x: ArrayLike, t_z: ArrayLike, yaw_rate: ArrayLike = 0.0
 ) -> Floats:

@@ -78,10 +78,30 @@ class Model:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Photo:
+    """The ground as a picture of itself from straight above, for cameras that look down from afar.
+
+    Attributes:
+        low: (x, y) world metres of its south-western corner.
+        texel: Metres along each side of a texel.
+        image: (H, W, 3) uint8 albedo, coded by the square root as textures are; rows run north.
+    """
+
+    low: tuple[float, float]
+    texel: float
+    image: NDArray[np.uint8]
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Metres from west to east and from south to north."""
+        return self.image.shape[1] * self.texel, self.image.shape[0] * self.texel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Ground:
     """The flat ground: a road band along a reference line, and land on both sides out to the horizon.
 
-    The shader paints asphalt, marks and verge from ``coordinates``.
+    The shader paints asphalt, marks and verge from ``coordinates``, or from ``photo`` where there is one.
 
     Attributes:
         vertices: (V, 3) float32, world metres.
@@ -90,6 +110,7 @@ class Ground:
         lane_edges: (E,) offsets d of the painted lines, left to right (descending d).
         line_styles: (E,) uint8: 0 none, 1 solid white, 2 dashed white, 3 solid yellow, 4 double yellow.
         paved: (lowest d, highest d) of the asphalt.
+        photo: What is painted on the faces within ``paved``, in place of a road.
     """
 
     vertices: NDArray[np.float32]
@@ -98,6 +119,7 @@ class Ground:
     lane_edges: NDArray[np.float64]
     line_styles: NDArray[np.uint8]
     paved: tuple[float, float]
+    photo: Photo | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -216,3 +216,102 @@ class MotorcycleLaneParams(Params):
     scenery: LaneSceneryParams = LaneSceneryParams()
     light: LaneLightParams = LaneLightParams()
     sensor: SensorParams = SensorParams()
+
+
+class AerialCameraParams(Params):
+    """The camera below the platform."""
+
+    width: Annotated[int, Field(ge=16, le=4096)] = 640
+    height: Annotated[int, Field(ge=16, le=4096)] = 480
+    focal: Positive = 800.0
+    """Pixels."""
+    tilt: Annotated[FiniteFloat, Field(ge=0, le=0.7)] = 0.22
+    """Radians from straight down, toward the picture's upper edge."""
+
+
+class PlatformParams(Params):
+    """How the platform flies."""
+
+    altitude: Annotated[FiniteFloat, Field(ge=60, le=400)] = 185.0
+    """Metres above the ground, in the mean."""
+    climb: Annotated[FiniteFloat, Field(ge=0, le=0.4)] = 0.06
+    """How far the altitude swings, as a part of it."""
+    speed: FiniteFloat = 0.0
+    """M/s along the road; a convoy is followed instead."""
+    roam: NonNegative = 14.0
+    """Metres that the aim swings about its place on the ground."""
+    sway: NonNegative = 0.0
+    """Metres that the aim swings along the road: vehicles leave the picture and come back."""
+    turn: NonNegative = 0.12
+    """Radians that the heading swings."""
+    jitter: NonNegative = 1.2
+    """Standard deviation of the shake, px."""
+
+
+class AerialRoadParams(Params):
+    """The road network, and the bridges over it."""
+
+    network: Literal["motorway", "intersection", "u-turn", "winding"] = "motorway"
+    lanes: Annotated[int, Field(ge=1, le=4)] = 3
+    """Lanes each way; an intersection's approaches have one more, to turn left."""
+    lane_width: Annotated[FiniteFloat, Field(ge=2.8, le=4.5)] = 3.6
+    bridges: Annotated[int, Field(ge=0, le=4)] = 1
+    bridge_width: Annotated[FiniteFloat, Field(ge=4, le=60)] = 24.0
+    """Metres from parapet to parapet; single bridges stray from it by a tenth."""
+
+
+class AerialTrafficParams(TrafficParams):
+    """Who drives below, and how hard they are to tell apart."""
+
+    density: NonNegative = 28.0
+    oncoming_density: NonNegative = 24.0
+    speed: NonNegative = 13.0
+    speed_spread: NonNegative = 1.8
+    vans: Fraction = 0.10
+    lorries: Fraction = 0.07
+    buses: Fraction = 0.02
+    waves: Fraction = 0.6
+    """How much slower than free traffic the troughs of the waves are that run through a dense stream."""
+    lookalikes: Fraction = 0.6
+    """Share of the vehicles that are of one of `looks` models and paints."""
+    looks: Annotated[int, Field(ge=1, le=8)] = 2
+    convoy: Annotated[int, Field(ge=0, le=20)] = 0
+    """Vehicles that drive one behind another; the platform follows them."""
+    bridge_density: NonNegative = 14.0
+    """Vehicles per kilometre and lane on the roads over the bridges."""
+
+
+class AerialSceneryParams(Params):
+    """What stands beside the road."""
+
+    setting: Literal["open", "suburb", "town"] = "open"
+    trees: NonNegative = 1.0
+    """Multiplies the trees."""
+    overhang: NonNegative = 6.0
+    """Trees per kilometre of each roadside whose crowns hang over the outer lane."""
+    buildings: NonNegative = 1.0
+    """Multiplies the buildings."""
+    wind: NonNegative = 0.4
+    """How far plants sway, in hundredths of their height."""
+
+
+class RecordingParams(Params):
+    """Recorded traffic in place of simulated."""
+
+    path: str = ""
+    """CommonRoad XML, or a table of vehicles as Geo-trax writes it; empty for none."""
+    start: NonNegative = 0.0
+    """Seconds into the recording at which the run begins."""
+
+
+class AerialParams(Params):
+    """Traffic seen from a platform in the air."""
+
+    camera: AerialCameraParams = AerialCameraParams()
+    platform: PlatformParams = PlatformParams()
+    road: AerialRoadParams = AerialRoadParams()
+    traffic: AerialTrafficParams = AerialTrafficParams()
+    recording: RecordingParams = RecordingParams()
+    scenery: AerialSceneryParams = AerialSceneryParams()
+    light: LaneLightParams = LaneLightParams(cloud=0.25, passing=0.25, haze=0.0004)
+    sensor: SensorParams = SensorParams(noise=2.0, vignetting=0.18)

@@ -143,6 +143,21 @@ class Ego:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Aloft:
+    """A camera in the air at one tick.
+
+    Attributes:
+        position: (3,) float64, world metres.
+        rotation: (3, 3) float64, world to camera, as `sim.camera.Pose` has it.
+        velocity: (3,) float64, m/s.
+    """
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Lighting:
     """The light at one tick, as factors on the scene's `sim.models.Light`, red, green and blue.
 
@@ -167,6 +182,7 @@ class WorldState:
         lighting: How the light differs from the scene's.
         sway: (S, 2) how the scene's S pieces of scenery lean, as `Bodies.leans`, or None where the air is
             still.
+        aloft: The camera, where it flies.
     """
 
     tick: int
@@ -175,6 +191,7 @@ class WorldState:
     ego: Ego | None
     lighting: Lighting = Lighting()
     sway: NDArray[np.float64] | None = None
+    aloft: Aloft | None = None
 
     @property
     def time(self) -> float:

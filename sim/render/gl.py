@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sim.camera import Camera, Pose
 from sim.render.antialias import smooth_edges
 from sim.render.context import check, context
-from sim.render.ground import MARGIN, cut, grain_texture, mark_table, road_texture
+from sim.render.ground import MARGIN, cut, grain_texture, ground_texture, mark_table
 from sim.render.instances import COMMAND, CONTACT, INSTANCE, Library, contacts, in_bands
 from sim.render.lamps import HALO, LIGHTS, Burning, LampPlan, halos, lights
 from sim.render.materials import material_table
@@ -26,7 +26,8 @@ from sim.world import SKY_ID, Lighting, WorldState
 
 _ROOM = 8192  # instances and draws in a frame
 
-_SHADOW_REACH = 120.0  # metres within which bodies cast shadows
+_SHADOW_REACH = 120.0  # metres within which bodies cast shadows, for a camera near the ground
+_SHADOW_ALOFT = 2.2  # camera heights within which they do, for one in the air
 _SHADOW_WIDEN = 2.5  # half-widths of the frame within which they do
 _BEAM = 44.0
 _BODY_LIGHTS = 4  # lamps that light bodies, of those that light the ground
@@ -125,7 +126,8 @@ class GlRenderer:
         selection = in_bands(bodies, self._library.select(bodies, camera, pose), pose)
         commands = self._library.commands(selection.meshes)
         casters = self._library.select(bodies, camera, pose, widen=_SHADOW_WIDEN, coarsest=True)
-        casters = in_bands(bodies, casters.within(bodies, pose, _SHADOW_REACH), pose)
+        reach = max(_SHADOW_REACH, _SHADOW_ALOFT * float(pose.position[2]))
+        casters = in_bands(bodies, casters.within(bodies, pose, reach), pose)
         shades = self._library.commands(casters.meshes)
         stretches = self._ground.select(camera, pose)
         view = view_matrices(camera, pose)
@@ -142,7 +144,7 @@ class GlRenderer:
             self._light_up(self._body, burning, pose, _BODY_LIGHTS)
             self._pool.draw(ctx, camera, pose)
             self._pool.use(6, 7)
-        self._main_pass(ctx, view, (len(commands), len(stretches)))
+        self._main_pass(ctx, view, (len(commands), len(stretches)), pose)
         self._contact_pass(ctx, view, contacts(state.vehicles, pose))
         self._sky_pass(ctx, camera, pose)
         self._halo_pass(ctx, view, halos(burning, camera, night=self._stage.light.night)[:_ROOM])
@@ -171,13 +173,15 @@ class GlRenderer:
         set_uniforms(self._body_shadow, **view, u_sun=tuple(sun), u_ground=-float(pose.position[2]))
         self._body_shadow_array.render_indirect(self._caster_commands, count=draws)
 
-    def _main_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int]) -> None:
+    def _main_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int], pose: Pose) -> None:
         self._target.use()
         ctx.enable_only(ctx.DEPTH_TEST | ctx.CULL_FACE)
         ctx.front_face = "cw"
         self._target.clear()
         for shader in (self._body, self._paved, self._land):
             set_uniforms(shader, **view)
+        if (photo := self._stage.ground.photo) is not None:
+            set_uniforms(self._paved, u_eye=tuple(pose.position[:2] - photo.low), u_extent=photo.extent)
         self._texture_array.use(0)
         self._grain.use(1)
         self._road.use(2)
@@ -286,7 +290,7 @@ class GlRenderer:
             ctx.texture_array((layers.shape[2], layers.shape[1], len(layers)), 4, layers.tobytes())
         )
         self._grain = self._mapped(ctx, grain_texture(light.seed))
-        self._road = self._mapped(ctx, road_texture(self._stage.ground, light.seed))
+        self._road = self._mapped(ctx, ground_texture(self._stage.ground, light.seed))
         self._texture_array.build_mipmaps()
         self._texture_array.filter = (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
         marks = mark_table(self._stage.ground)
@@ -332,7 +336,8 @@ class GlRenderer:
                 self._faces,
             )
         )
-        self._paved = keep(program(ctx, "ground", "ground", "ROAD", *night, shared=("light",)))
+        paint = "ROAD" if stage.ground.photo is None else "PHOTO"
+        self._paved = keep(program(ctx, "ground", "ground", paint, *night, shared=("light",)))
         self._land = keep(program(ctx, "ground", "ground", *night, shared=("light",)))
         self._paved_array, self._land_array = (
             keep(
@@ -341,6 +346,11 @@ class GlRenderer:
                     [
                         (self._ground_vertices, "3f 2f", "in_position", "in_road"),
                         (self._stretches, "3f 1f/i", "i_offset", "i_arc"),
+                    ]
+                    if "in_road" in shader
+                    else [
+                        (self._ground_vertices, "3f 8x", "in_position"),
+                        (self._stretches, "3f 4x/i", "i_offset"),
                     ],
                     self._ground_faces,
                 )

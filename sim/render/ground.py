@@ -226,6 +226,14 @@ def road_texture(ground: Ground, seed: int) -> NDArray[np.uint8]:
     return (np.clip(channels, 0, 1) * 255 + 0.5).astype(np.uint8)
 
 
+def ground_texture(ground: Ground, seed: int) -> NDArray[np.uint8]:
+    """Return what the paved band is painted from, (H, W, 4): the ground's photo, or a worn road."""
+    if ground.photo is None:
+        return road_texture(ground, seed)
+    image = ground.photo.image
+    return np.concatenate([image, np.full_like(image[..., :1], 255)], axis=-1)
+
+
 def mark_table(ground: Ground) -> NDArray[np.float32]:
     """Tell for each place across the road which painted line is nearest.
 

@@ -41,7 +41,8 @@ CONTACT = np.dtype([("position", "<f4", 3), ("turn", "<f4", 2), ("half", "<f4", 
 SWITCH_FOCAL = 800.0
 """Pixels: the focal length for which models say at what distance a coarser mesh takes over."""
 
-_CONTACT_REACH = 90.0
+_CONTACT_REACH = 90.0  # metres along the axis, for a camera near the ground
+_CONTACT_ALOFT = 2.2  # camera heights, for one in the air
 _NARROWEST_PX = 0.35
 _BANDS_PER_OCTAVE = 2
 
@@ -221,7 +222,8 @@ def contacts(vehicles: Bodies, pose: Pose) -> NDArray[np.void]:
     """Return (M,) `CONTACT` records of the vehicles that are near and ahead."""
     offset = vehicles.positions - pose.position
     ahead = offset @ pose.rotation[2]
-    rows = np.flatnonzero((ahead > -vehicles.sizes[:, 0]) & (ahead < _CONTACT_REACH))
+    reach = max(_CONTACT_REACH, _CONTACT_ALOFT * float(pose.position[2]))
+    rows = np.flatnonzero((ahead > -vehicles.sizes[:, 0]) & (ahead < reach))
     out = np.zeros(len(rows), CONTACT)
     out["position"] = offset[rows]
     out["turn"] = np.column_stack([np.cos(vehicles.yaws[rows]), np.sin(vehicles.yaws[rows])])

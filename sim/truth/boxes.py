@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sim.camera import Camera, Pose
+from sim.camera import Camera, Pose, ground_homography
 from sim.render.types import Picture, Silhouettes
-from sim.truth.types import FrameTruth
+from sim.truth.types import AerialTruth, FrameTruth
 from sim.world import SKY_ID, Bodies, WorldState
 
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
@@ -27,6 +29,9 @@ def frame_truth(
         camera: The intrinsics; the id map has its size.
         pose: The pose that both were drawn with.
 
+    Returns:
+        The truth, an `AerialTruth` where the camera flies.
+
     Raises:
         ValueError: If a silhouette is of no vehicle of the state, or the id map has another size.
     """
@@ -36,10 +41,12 @@ def frame_truth(
     visible_px, box_visible = visible_parts(picture.ids, silhouettes.ids)
     plots = silhouettes.plots
     corners = pose.to_camera(_box_corners(bodies))
-    ego_velocity = np.zeros(3)
+    own_velocity = np.zeros(3)
     if state.ego is not None:
-        ego_velocity[:2] = state.ego.speed * np.array([np.cos(state.ego.yaw), np.sin(state.ego.yaw)])
-    return FrameTruth(
+        own_velocity[:2] = state.ego.speed * np.array([np.cos(state.ego.yaw), np.sin(state.ego.yaw)])
+    if state.aloft is not None:
+        own_velocity = state.aloft.velocity
+    truth = FrameTruth(
         tick=state.tick,
         ids=silhouettes.ids,
         kinds=bodies.kinds,
@@ -59,7 +66,17 @@ def frame_truth(
         ),
         distances=corners[..., 2].min(axis=1),
         positions=corners.mean(axis=1),
-        velocities=(bodies.velocities - ego_velocity) @ pose.rotation.T,
+        velocities=(bodies.velocities - own_velocity) @ pose.rotation.T,
+    )
+    if state.aloft is None:
+        return truth
+    return AerialTruth(
+        **{f.name: getattr(truth, f.name) for f in fields(truth)},
+        world_positions=bodies.positions,
+        world_velocities=bodies.velocities,
+        sizes=bodies.sizes,
+        colours=bodies.colours,
+        ground_to_image=ground_homography(camera, pose),
     )
 
 

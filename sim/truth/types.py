@@ -63,6 +63,26 @@ class FrameTruth:
         return _share(self.visible_px, self.amodal_px_full)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AerialTruth(FrameTruth):
+    """The truth of a frame that a camera in the air took: where the vehicles are on the ground, too.
+
+    Attributes:
+        world_positions: (N, 3) float64, metres: the middle of the footprint.
+        world_velocities: (N, 3) float64, m/s, over the ground.
+        sizes: (N, 3) float64, length, width, height, metres.
+        colours: (N, 3) float32, sRGB paint in [0, 1]: with the sizes they tell who looks like whom.
+        ground_to_image: (3, 3) float64, the homography from the ground plane, metres east and north, to
+            pixels; its last row gives the depth, metres.
+    """
+
+    world_positions: NDArray[np.float64]
+    world_velocities: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+    colours: NDArray[np.float32]
+    ground_to_image: NDArray[np.float64]
+
+
 def _share(part: NDArray[np.int64], whole: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.divide(part, whole, out=np.zeros(len(part)), where=whole > 0)
 

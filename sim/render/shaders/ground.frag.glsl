@@ -9,7 +9,11 @@ uniform sampler2D u_pool;  // light of lamps, and of the own beam
 uniform sampler2D u_mirror;
 uniform vec2 u_frame;
 #endif
-#ifdef ROAD
+#if defined(PHOTO)
+uniform sampler2D u_road;  // the ground from straight above
+uniform vec2 u_eye;  // camera, metres east and north of the picture's corner
+uniform vec2 u_extent;  // metres
+#elif defined(ROAD)
 uniform sampler2D u_road;
 uniform sampler2D u_marks;  // by offset: middle of the nearest line, its half width, 1 if dashed, 1 if yellow
 uniform float u_margin;
@@ -23,12 +27,21 @@ layout(location = 1) out uint o_id;
 layout(location = 2) out float o_depth;
 
 void main() {
-    float s = v_road.x, d = v_road.y;
     float distance = length(v_at);
     vec3 view = v_at / distance;
+#if defined(PHOTO)
+    vec2 at = v_at.xy + u_eye;
+    vec3 shown = texture(u_road, at / u_extent, -0.6).rgb;
+    vec4 fine = texture(u_grain, at / 19.0);
+    vec3 albedo = shown * shown * (0.86 + 0.28 * fine.r);
+    float road_mark = 0.0;
+    float film_of_water = 0.0;
+#else
+    float s = v_road.x, d = v_road.y;
     vec4 broad = texture(u_grain, vec2(d, s) / 60.0);
     vec4 fine = texture(u_grain, vec2(d / 2.0, s / 8.0), -1.0);
-#ifdef ROAD
+#endif
+#if defined(ROAD)
     float wide = fwidth(d), along = max(fwidth(s), 0.02);
     float across = (d - u_paved.x + u_margin) / (u_paved.y - u_paved.x + 2.0 * u_margin);
     vec4 worn = texture(u_road, vec2(across, s / 240.0), -1.5);
@@ -44,7 +57,7 @@ void main() {
     float road_mark = painted * clamp(1.35 - 0.9 * worn.b * worn.b - 0.5 * fine.r * worn.b, 0.0, 1.0);
     albedo = mix(albedo, mix(vec3(0.62, 0.62, 0.60), vec3(0.62, 0.40, 0.08), line.w), road_mark);
     float film_of_water = u_wet * clamp(0.55 + 2.5 * (worn.r - 0.5) + 0.5 * (broad.g - 0.4), 0.25, 1.0);
-#else
+#elif !defined(PHOTO)
     vec3 grass = texture(u_textures, vec3(d / 5.0, s / 5.0, 17.0)).rgb;
     vec3 dry = vec3(0.42, 0.34, 0.18) * (0.4 + 0.9 * fine.g);
     vec3 land = mix(grass * grass, dry, clamp((broad.a - 0.42) * 5.5, 0.0, 1.0)) * (0.65 + 0.7 * broad.g);
