@@ -111,18 +111,18 @@ def log_ratios(pictures: Floats, hidden: list[Floats]) -> Floats:
     if not hidden or not len(pictures):
         return np.zeros((len(hidden), len(pictures)))
     pooled = pool(hidden)
-    own = np.empty((len(hidden), len(pictures)))
-    for i, group in enumerate(hidden):
-        apart = pictures[:, None, :] - group[None]
-        own[i] = np.median(intra(group, pooled).log_density(apart), 1)
+    within = [intra(group, pooled) for group in hidden]
     middles = np.array([group.mean(0) for group in hidden])
+    variances = np.array([gaussian.variance for gaussian in within])
     strange = Gaussian(middles.mean(0), pooled + (STRANGE**2 + middles.var(0)))
-    best_other = np.tile(strange.log_density(pictures), (len(hidden), 1))
-    for i, group in enumerate(hidden):
-        apart = pictures[:, None, :] - group[None]
-        for k, other in enumerate(hidden):
-            if k != i:
-                # If the new vehicle were k, its differences to i would be those of k to i.
-                as_other = np.median(inter(other, group, pooled).log_density(apart), 1)
-                best_other[i] = np.maximum(best_other[i], as_other)
-    return own - best_other
+    ratios = np.empty((len(hidden), len(pictures)))
+    for j, picture in enumerate(pictures):
+        unlike = float(strange.log_density(picture))
+        squares = (picture - middles) ** 2
+        for i, (group, own) in enumerate(zip(hidden, within, strict=True)):
+            # If the new vehicle were k, its differences to i would be those of k to i, as `inter` has them.
+            between = 0.5 * (variances + variances[i])
+            others = -0.5 * (squares / between + np.log(2.0 * np.pi * between)).mean(1)
+            others[i] = unlike
+            ratios[i, j] = np.median(own.log_density(picture - group)) - others.max()
+    return ratios

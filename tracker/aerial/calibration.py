@@ -59,6 +59,7 @@ class Calibration:
         self._forecaster, self._every = forecaster, every
         self._running: list[Rehearsal] = []
         self._measures: dict[int, deque[float]] = {lead: deque(maxlen=MEMORY) for lead in LEADS}
+        self._scales = np.ones(len(LEADS))
         self._turn = 0
 
     def step(self, trajectories: Trajectories, tick: int, seen: list[int]) -> None:
@@ -77,6 +78,8 @@ class Calibration:
                 apart = trajectories.at(rehearsal.track, [tick])[0] - rehearsal.forecast.point
                 measure = float(apart @ np.linalg.solve(rehearsal.forecast.covariance, apart))
                 self._measures[lead].append(measure)
+        if tick % self._every == 0:
+            self._scales = np.array([scale(measures) for measures in self._measures.values()])
         self._running = [r for r in self._running if tick - r.since < LEADS[-1] and r.track in visible]
         busy = {rehearsal.track for rehearsal in self._running}
         free = [track for track in seen if track not in busy]
@@ -88,7 +91,7 @@ class Calibration:
 
     def scale(self, lead: int) -> float:
         """Return the factor for covariances of forecasts ``lead`` frames ahead."""
-        return float(np.interp(lead, LEADS, [scale(measures) for measures in self._measures.values()]))
+        return float(np.interp(lead, LEADS, self._scales))
 
 
 def scale(measures: ArrayLike) -> float:

@@ -82,7 +82,9 @@ class Fusion:
         if self.motion:
             ratios += -0.5 * (squared + sizes[:, None]) - np.log(2.0 * np.pi * new.strangers)
         if self.looks:
-            ratios += self.looks * appearance.log_ratios(new.pictures, hidden.pictures)
+            near = np.flatnonzero((squared <= self.gate).any(1))
+            looks = appearance.log_ratios(new.pictures, [hidden.pictures[i] for i in near])
+            ratios[near] += self.looks * looks
         ratios -= np.log(np.maximum(hidden.unseen, 1e-3))[:, None]
         return best(np.where(squared <= self.gate, ratios, -np.inf), self.least)
 
