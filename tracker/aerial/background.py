@@ -1,9 +1,9 @@
 """The ground without its traffic: a background in the mosaic, and what differs from it.
 
 A window of the mosaic goes along with the view. Each of its pixels keeps a mean colour with its usual
-deviation, so that edges, which never lie quite still, are taken for what they are, and a rival colour. The rival takes
-over once it has been seen more often: soon where the first sight was of a vehicle, late elsewhere, and never below
-a track, since vehicles queue.
+deviation, so that edges, which never lie quite still, are taken for what they are, and a rival colour. The
+rival takes over once it has been seen more often: soon where the first sight was of a vehicle, late
+elsewhere, and never below a track, since vehicles queue.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ LEAST_CHANGE = 8.0
 """Grey levels of a channel that are always noise."""
 DEVIATIONS = 2.5
 """Usual deviations that are noise."""
+AROUND = 4
+"""Half side of the patch of ground that tells the light, px."""
 RATE = 1.0 / 50.0
 NEW_SPREAD = 4.0
 """Usual deviation of a new pixel, grey levels."""
@@ -95,6 +97,12 @@ class Background:
         """Return (h, w, 3) the background image of the view."""
         x0, y0, x1, y1 = self.view
         return np.asarray(np.round(self._mean[y0:y1, x0:x1]).astype(np.uint8))
+
+    def light(self, place: Floats) -> float:
+        """Return the grey level of the ground about a place (2,) of the mosaic, at least 20."""
+        x, y = (place - self.origin).astype(int)
+        around = self._mean[max(y - AROUND, 0) : y + AROUND + 1, max(x - AROUND, 0) : x + AROUND + 1]
+        return max(float(around.mean()), 20.0) if around.size else 100.0
 
     def _go_along(self, corners: Floats) -> None:
         """Move the window if the view leaves it."""

@@ -20,7 +20,7 @@ LONGEST = 12.0
 """Seconds after which a hidden vehicle is lost."""
 DETECTION = 0.95
 """Chance that a vehicle in plain view is found."""
-GIVEN_UP = 0.03
+GIVEN_UP = 0.2
 """Chance of not having been seen below which a hidden vehicle is taken to have gone elsewhere ..."""
 PATIENCE = 45
 """... once it has been so low for so many frames."""
@@ -89,7 +89,7 @@ class HiddenVehicles:
         places = track.centre + np.outer(SIGMA * np.sqrt(values[1]), axes[:, 1])
         shown = transform(np.linalg.inv(to_mosaic), places)
         framed = ((shown > RIM) & (shown < self._size - RIM)).all(1)
-        return 1.0 - DETECTION * float(WEIGHTS @ (framed * self.occluders.visible(places)))
+        return 1.0 - DETECTION * float(WEIGHTS @ (framed * self.occluders.visible(places, track.heading)))
 
     def reacquire(self, new: list[Track], to_mosaic: Floats) -> list[tuple[Track, Track]]:
         """Return pairs of a hidden track and the new one that is the same vehicle; the hidden are let go."""

@@ -13,6 +13,8 @@ Labels = NDArray[np.int32]
 
 REACH = 1.35
 """Half sides of an expected vehicle within which a pixel may be its own."""
+SCRAP = 0.3
+"""Share of an expected vehicle's area below which a region may be a part of it that has come off."""
 LEAST_PIXELS = 10
 """Pixels of a measurement."""
 
@@ -48,17 +50,23 @@ def corners(centres: Floats, headings: Floats, sizes: Floats) -> Floats:
 
 
 def outline(
-    labels: Labels, single: NDArray[np.bool_], centres: Floats, headings: Floats, sizes: Floats
+    labels: Labels,
+    single: NDArray[np.bool_],
+    senior: NDArray[np.bool_],
+    centres: Floats,
+    headings: Floats,
+    sizes: Floats,
 ) -> tuple[Outlines, NDArray[np.bool_], Labels]:
     """Measure expected vehicles in a labelled foreground.
 
-    Each labelled pixel goes to the one of the expected that lies nearest, in its own half sides, if any is near
-    enough; a region that can be but one vehicle goes as a whole to who has most of it. A rectangle has its
-    pixels' mean and variances.
+    Each labelled pixel goes to the one of the expected that lies nearest, in its own half sides, if any is
+    near enough; a region that can be but one vehicle goes as a whole to who has most of it. A rectangle has
+    its pixels' mean and variances.
 
     Args:
         labels: (H, W) of regions 1 to R, 0 is background.
         single: (R + 1,) which regions are one vehicle at most.
+        senior: (N,) who comes before the others where a region is one vehicle's.
         centres: (N, 2) where they are expected, px of ``labels``.
         headings: (N, 2).
         sizes: (N, 2).
@@ -67,7 +75,7 @@ def outline(
         What was found of each; (N,) who lost all to others in such regions; and (H, W) the labels that nobody
         claims.
     """
-    sums, beaten, left = _claim(labels, single, centres, headings, 0.5 * sizes)
+    sums, beaten, left = _claim(labels, single, senior, centres, headings, 0.5 * sizes)
     return _outlines(sums, headings), beaten, left
 
 
@@ -99,7 +107,7 @@ def _outlines(sums: Floats, headings: Floats) -> Outlines:
 
 
 @njit(cache=True)
-def _claim(labels, single, centres, headings, halves):  # type: ignore[no-untyped-def]
+def _claim(labels, single, senior, centres, headings, halves):  # type: ignore[no-untyped-def]
     """As `outline`: sums (N, 5) as `_add` makes them, who is beaten (N,), and labels left (H, W)."""
     height, width = labels.shape
     count = centres.shape[0]
@@ -119,15 +127,31 @@ def _claim(labels, single, centres, headings, halves):  # type: ignore[no-untype
                 away = np.float32(max(along, across))
                 if away <= REACH and away < nearest[i, j]:
                     nearest[i, j], owner[i, j] = away, n
-    votes = np.zeros((single.size, count), np.int32)
+    votes, areas = np.zeros((single.size, count), np.int32), np.zeros(single.size, np.int32)
     for i in range(height):
         for j in range(width):
-            if owner[i, j] >= 0 and single[labels[i, j]]:
-                votes[labels[i, j], owner[i, j]] += 1
+            if labels[i, j] > 0:
+                areas[labels[i, j]] += 1
+                if owner[i, j] >= 0:
+                    votes[labels[i, j], owner[i, j]] += 1
     winner = np.full(single.size, -1, np.int32)
-    for label in range(1, single.size):
-        for n in range(count):
-            if votes[label, n] > 0 and (winner[label] < 0 or votes[label, n] > votes[label, winner[label]]):
+    allowed = np.zeros((single.size, count), np.bool_)
+    for n in range(count):
+        main = votes[:, n].argmax()
+        for label in range(1, single.size):
+            # Besides its own region a vehicle may have scraps, but no other region of some size.
+            small = areas[label] < SCRAP * 4.0 * halves[n, 0] * halves[n, 1]
+            allowed[label, n] = votes[label, n] > 0 and (label == main or small)
+            other = winner[label]
+            if (
+                allowed[label, n]
+                and single[label]
+                and (
+                    other < 0
+                    or (senior[n] and not senior[other])
+                    or (senior[n] == senior[other] and votes[label, n] > votes[label, other])
+                )
+            ):
                 winner[label] = n
     sums, left = np.zeros((count, 5)), labels.copy()
     for i in range(height):
@@ -135,7 +159,7 @@ def _claim(labels, single, centres, headings, halves):  # type: ignore[no-untype
             label = labels[i, j]
             if label > 0:
                 n = winner[label] if winner[label] >= 0 else owner[i, j]
-                if n >= 0:
+                if n >= 0 and allowed[label, n]:
                     left[i, j] = 0
                     _add(sums[n], headings[n], i, j)
     beaten = np.zeros(count, np.bool_)

@@ -66,12 +66,14 @@ class Fusion:
         motion: Whether the place counts beyond the gate.
         looks: Weight of the mean log likelihood ratio of appearance: as many independent dimensions as a
             picture is worth. 0 leaves appearance out.
+        most: Greatest weight of looks, either way: light and partial views are not modelled.
         gate: Greatest squared Mahalanobis distance.
         least: Log likelihood ratio that a match needs. Raising it gives fewer wrong ones, and misses more.
     """
 
     motion: bool = True
     looks: float = 12.0
+    most: float = 6.0
     gate: float = 16.0
     least: float = 0.0
 
@@ -84,7 +86,7 @@ class Fusion:
         if self.looks:
             near = np.flatnonzero((squared <= self.gate).any(1))
             looks = appearance.log_ratios(new.pictures, [hidden.pictures[i] for i in near])
-            ratios[near] += self.looks * looks
+            ratios[near] += np.clip(self.looks * looks, -self.most, self.most)
         ratios -= np.log(np.maximum(hidden.unseen, 1e-3))[:, None]
         return best(np.where(squared <= self.gate, ratios, -np.inf), self.least)
 

@@ -1,8 +1,8 @@
 """The aerial tracker: paper 2's idea with its limits mended (registry name ``aerial``).
 
-The picture is laid onto a mosaic; what differs from the ground and moves is followed by Kalman filters. A vehicle
-that vanishes is forecast by its motion context; what appears anew is compared with the forecasts by place and
-looks, all at once, before it gets its id.
+The picture is laid onto a mosaic; what differs from the ground and moves is followed by Kalman filters. A
+vehicle that vanishes is forecast by its motion context; what appears anew is compared with the forecasts by
+place and looks, all at once, before it gets its id.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from tracker.aerial.hidden import HiddenVehicles
 from tracker.aerial.measuring import free_outlines, outline
 from tracker.aerial.motion_context import ContextForecast
 from tracker.aerial.reacquisition import Fusion, Matcher
+from tracker.aerial.shadows import CastShadows
 from tracker.aerial.stabilisation import Floats, Stabiliser, jacobian, transform
 from tracker.aerial.tracks import Track
 from tracker.aerial.trajectories import Trajectories
@@ -32,10 +33,14 @@ BORDER = 3.0
 """Px from the picture's border within which an outline is cut off."""
 MOVED = 0.5
 """Lengths that a track must have gone to be confirmed: what only seems to move, being high, does not go far."""
+COMPACT = 0.6
+"""Share of a rectangle that is foreground where a track begins: what is less may be two vehicles."""
 ENOUGH = 5
 """Vehicles whose median size is the usual one."""
 LARGEST = np.array([1.4, 1.5])
 """Length and width of a region, in usual ones, up to which it is one vehicle's."""
+USUAL_LIGHT = 100.0
+"""Grey level of the ground to which pictures are scaled: a bridge's shadow darkens vehicles and road alike."""
 GOES = 8.0
 """Px in `WINDOW` frames from which on a track is rehearsed."""
 
@@ -57,6 +62,7 @@ class AerialTracker:
         """Forget everything and get ready for an episode."""
         self._info = info
         self._stabiliser, self._background = Stabiliser(), Background()
+        self._shadows = CastShadows()
         self._trajectories = Trajectories()
         self._tracks: list[Track] = []
         self._hidden = HiddenVehicles(self._forecaster, self._matcher, info.width, info.height, info.rate)
@@ -91,9 +97,13 @@ class AerialTracker:
         places = np.array([track.state[:, 0] for track in self._tracks]).reshape(-1, 2) - origin
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
         sizes = np.array([track.size for track in self._tracks]).reshape(-1, 2)
-        own, beaten, left = outline(blobs.labels, self._single(blobs), places, headings, sizes)
+        self._shadows.learn(self._background, blobs.labels, len(blobs))
+        senior = np.array([track.confirmed for track in self._tracks], np.bool_)
+        expected, wide = self._shadows.cast(places, headings, sizes)
+        own, beaten, left = outline(blobs.labels, self._single(blobs), senior, expected, headings, wide)
+        own = self._shadows.lift(own)
         rest = find_blobs(left > 0, LEAST_AREA)
-        free = free_outlines(rest.labels, len(rest))
+        free = self._shadows.lift(free_outlines(rest.labels, len(rest)))
         to_picture = np.linalg.inv(to_mosaic)
         cut = self._cut_off(transform(to_picture, own.corners() + origin))
         for k, track in enumerate(self._tracks):
@@ -108,7 +118,8 @@ class AerialTracker:
         rows, columns = tracks.take_free(missed, free)
         for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
             tracks.measure(missed[i], free.centres[j], free.sizes[j], self._tick, bool(cut[j]))
-        for j in np.setdiff1d(np.flatnonzero(free.pixels), columns).tolist():
+        compact = free.pixels >= COMPACT * free.sizes.prod(1)
+        for j in np.setdiff1d(np.flatnonzero(compact & (free.pixels > 0)), columns).tolist():
             self._tracks.append(tracks.begin(next(self._ids), free, j, self._tick))
         found = np.concatenate([own.corners()[own.pixels > 0] + origin, free.corners()])
         return _boxes(transform(to_picture, found))
@@ -135,9 +146,11 @@ class AerialTracker:
                 picture = appearance.cut(
                     image, middle, turn @ (half[0] * track.heading), turn @ (half[1] * across)
                 )
-                track.pictures.append(picture)
+                track.pictures.append(picture * (USUAL_LIGHT / self._background.light(track.centre)))
         if whole:
-            self._hidden.occluders.see(np.array([track.centre for track in whole]))
+            self._hidden.occluders.see(
+                np.array([track.centre for track in whole]), np.array([track.heading for track in whole])
+            )
         known = [track.id for track in whole if track.confirmed and self._goes(track.id)]
         self._hidden.rehearse(self._trajectories, self._tick, known)
 
@@ -179,7 +192,7 @@ class AerialTracker:
         ticks = np.arange(old.since + 1, self._tick)
         last = self._trajectories.at(old.id, [self._tick])[0]
         share = np.linspace(0.0, 1.0, len(ticks) + 2)[1:-1, None]
-        self._hidden.occluders.miss(last + share * (track.origin - last))
+        self._hidden.occluders.miss(last + share * (track.origin - last), track.origin - last)
         track.id = old.id
         track.size = np.maximum(track.size, 0.9 * old.size)
         old.pictures.extend(track.pictures)

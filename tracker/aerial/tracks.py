@@ -119,7 +119,7 @@ def predict(tracks: list[Track]) -> None:
         track.state, track.spread = mean[2 * k : 2 * k + 2], spread[2 * k : 2 * k + 2]
 
 
-def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool) -> None:
+def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool) -> bool:
     """Correct a track by its outline along its heading.
 
     Where a part is hidden the end that lies where it was expected is right, and the length is the track's.
@@ -130,6 +130,9 @@ def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool
         size: (2,) length and width, px.
         tick: Of the frame.
         blocked: Whether the outline touches the picture's border.
+
+    Returns:
+        Whether it was taken; what lies too far off is another vehicle's, as where one drives on a bridge.
     """
     across = track.heading[::-1] * np.array([-1.0, 1.0])
     track.whole = bool(size[0] >= WHOLE * track.size[0]) and not blocked
@@ -142,6 +145,10 @@ def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool
             apart[axis] = candidates[np.abs(candidates).argmin()]
     at = track.state[:, 0] + apart[0] * track.heading + apart[1] * across
     noise = NOISE**2 if track.whole else (3.0 * NOISE) ** 2
+    if track.confirmed:
+        squared = float(((at - track.state[:, 0]) ** 2 / (track.spread[:, 0, 0] + noise)).sum())
+        if squared > GATE:
+            return False
     kalman.update(track.state, track.spread, np.arange(2), at, noise)
     if track.whole or track.hits <= 3:
         rate = np.where(size > track.size, GROW, SHRINK if track.hits > 3 else GROW)
@@ -150,6 +157,7 @@ def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool
         track.size = np.where(size > track.size, track.size + GROW * (size - track.size), track.size)
     track.hits, track.misses, track.since = track.hits + 1, 0, tick
     turn_to_velocity(track)
+    return True
 
 
 def turn_to_velocity(track: Track) -> None:

@@ -157,14 +157,17 @@ def test_the_printed_verification_may_refuse():
 
 
 def test_occluders_are_learnt_and_forgotten():
-    known = Occluders()
+    known, east, north = Occluders(), [1.0, 0.0], [0.0, -1.0]
     road, bridge = np.array([[100.0, 50.0]]), np.array([[100.0 + 5 * CELL, 50.0]])
-    before = known.visible(bridge)[0]
+    before = known.visible(bridge, east)[0]
     for _ in range(20):
-        known.see(road)
-        known.miss(bridge)
-    assert known.visible(bridge)[0] < 0.15 < before < known.visible(road)[0]
+        known.see(road, east)
+        known.miss(bridge, east)
+        known.see(bridge, north)
+    assert known.visible(bridge, east)[0] < 0.15 < before < known.visible(road, east)[0]
+    # Who drives over the bridge is seen where those below are not.
+    assert known.visible(bridge, north)[0] > 0.9
     for _ in range(400):
-        known.see(bridge)
-    assert known.visible(bridge)[0] > 0.8
-    assert known.visible(np.zeros((0, 2))).shape == (0,)
+        known.see(bridge, east)
+    assert known.visible(bridge, east)[0] > 0.8
+    assert known.visible(np.zeros((0, 2)), east).shape == (0,)
