@@ -118,7 +118,7 @@ class Stabiliser:
         return np.asarray(found / found[2, 2], np.float64)
 
     def _in_view(self, key: KeyFrame, grey: Grey) -> float:
-        """Return the share of a key frame's corners in the picture; 0 where it is turned or stretched much."""
+        """Return the share of a key frame's corners in the picture; 0 where it is much turned."""
         to_picture = np.linalg.inv(self._to_mosaic) @ key.to_mosaic
         middle = 0.5 * np.array(grey.shape[::-1], float)
         change = jacobian(to_picture, transform(np.linalg.inv(to_picture), middle)) - np.eye(2)

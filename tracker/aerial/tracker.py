@@ -32,7 +32,7 @@ LEAST_AREA = 30
 BORDER = 3.0
 """Px from the picture's border within which an outline is cut off."""
 MOVED = 0.5
-"""Lengths that a track must have gone to be confirmed: what only seems to move, being high, does not go far."""
+"""Lengths that a track must have gone to be confirmed: what only seems to move does not go far."""
 COMPACT = 0.6
 """Share of a rectangle that is foreground where a track begins: what is less may be two vehicles."""
 ENOUGH = 5
@@ -40,7 +40,7 @@ ENOUGH = 5
 LARGEST = np.array([1.4, 1.5])
 """Length and width of a region, in usual ones, up to which it is one vehicle's."""
 USUAL_LIGHT = 100.0
-"""Grey level of the ground to which pictures are scaled: a bridge's shadow darkens vehicles and road alike."""
+"""Grey level of the ground to which pictures are scaled: a shadow darkens vehicles and road."""
 GOES = 8.0
 """Px in `WINDOW` frames from which on a track is rehearsed."""
 
@@ -72,7 +72,7 @@ class AerialTracker:
 
     @property
     def diagnostics(self) -> Diagnostics:
-        """Detections, predictions of hidden vehicles, and the homography to the mosaic, of the last frame."""
+        """Detections, predictions of hidden vehicles, and the homography of the last frame."""
         return self._diagnostics
 
     def step(self, frame: Frame) -> Tracks:
@@ -125,7 +125,7 @@ class AerialTracker:
         return _boxes(transform(to_picture, found))
 
     def _single(self, blobs: Blobs) -> NDArray[np.bool_]:
-        """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of those that are known."""
+        """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of the known."""
         sizes = free_outlines(blobs.labels, len(blobs)).sizes
         known = np.array([track.size for track in self._tracks if track.confirmed and track.whole])
         usual = np.median(known if len(known) > ENOUGH else sizes, axis=0) if len(sizes) else np.zeros(2)

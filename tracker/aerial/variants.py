@@ -1,4 +1,4 @@
-"""The aerial tracker's relatives: the printed rules, ablations that differ in one component, and the baseline."""
+"""The aerial tracker's relatives: printed rules, ablations of one component, and the baseline."""
 
 from __future__ import annotations
 
