@@ -15,11 +15,14 @@ import typer
 from scenarios.errors import InputError
 
 if TYPE_CHECKING:
-    from scenarios.runs import Progress
+    from scenarios.workers import Progress
 
 UsageError: type[typer.BadParameter] = typer.BadParameter.__bases__[0]  # typer does not name it itself
+CANNOT = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
+CANNOT_BE_DONE = ("RenderUnavailableError", "WorkersLostError")
+"""Errors that are nobody's mistake here; by name, since whoever defines them is heavy."""
 
 app = typer.Typer(
     name="testtrack",
@@ -37,11 +40,43 @@ class Boxes(StrEnum):
     VISIBLE = "visible"
 
 
+class Format(StrEnum):
+    """How a dataset is laid out."""
+
+    MOT = "mot"
+    COCO = "coco"
+    KITTI = "kitti"
+
+
+class Coding(StrEnum):
+    """How the pictures of a dataset are stored."""
+
+    PNG = "png"
+    FFV1 = "ffv1"
+    H264 = "h264"
+
+
 Out = Annotated[
     Path | None,
     typer.Option(
         metavar="DIR", help="Write report, tracks, scores and log here; new or empty, or written before."
     ),
+]
+ScenarioName = Annotated[
+    str, typer.Argument(metavar="SCENARIO|FILE.toml", help="A scenario's name, or a file.")
+]
+Seed = Annotated[int | None, typer.Option(metavar="N", help="Which drive; 0 if not said.")]
+Jobs = Annotated[int, typer.Option(metavar="J", help="Processes; what comes out does not depend on it.")]
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Of a Dask scheduler that does the work; its workers must see --out under the same name.",
+    ),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Such as sensor.noise=3; once or more."),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
 
@@ -63,20 +98,16 @@ def list_all(as_json: Json = False) -> None:
 
 @app.command()
 def run(
-    scenario: Annotated[
-        str, typer.Argument(metavar="SCENARIO|FILE.toml", help="A scenario's name, or a file.")
-    ],
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Which drive; 0 if not said.")] = None,
+    scenario: ScenarioName,
+    seed: Seed = None,
     seeds: Annotated[str | None, typer.Option(metavar="A:B", help="The drives A, A+1, ... B-1.")] = None,
-    jobs: Annotated[int, typer.Option(metavar="J", help="Processes; the scores do not depend on it.")] = 1,
+    jobs: Jobs = 1,
+    cluster: Cluster = None,
     tracker: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME|module:object", help="Once or more; the scene's own if not said."),
     ] = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Such as sensor.noise=3; once or more."),
-    ] = None,
+    overrides: Overrides = None,
     boxes: Annotated[Boxes, typer.Option(help="Which boxes of the truth are scored.")] = Boxes.AMODAL,
     odometry: Annotated[
         bool, typer.Option("--odometry", help="Give the trackers the car's odometry.")
@@ -86,8 +117,7 @@ def run(
 ) -> None:
     """Simulate drives, let trackers follow them, and score what they found."""
     chosen = _seeds(seed, seeds)
-    if jobs < 1:
-        raise InputError(f"--jobs {jobs}: wanted a whole number of at least 1")
+    _check_jobs(jobs, cluster)
     from scenarios import spec
 
     resolved = spec.load(scenario, overrides or ())
@@ -96,15 +126,18 @@ def run(
         raise InputError(f"--tracker {' --tracker '.join(names)}: wanted each tracker once")
     from scenarios.output import whole_directory
     from scenarios.runs import Run, execute, make_tracker
+    from scenarios.workers import open_workers
 
     for name in names:
         make_tracker(name)
-    wanted = Run(
-        scenario=resolved, seeds=chosen, trackers=names, boxes=boxes.value, odometry=odometry, jobs=jobs
-    )
+    wanted = Run(scenario=resolved, seeds=chosen, trackers=names, boxes=boxes.value, odometry=odometry)
     place = whole_directory(out) if out else nullcontext()
-    with place as directory, _progress(resolved.name, wanted.frames) as advance:
-        document = execute(wanted, directory, advance)
+    with (
+        open_workers(min(jobs, len(chosen)), cluster) as workers,
+        place as directory,
+        _progress(resolved.name, wanted.frames) as advance,
+    ):
+        document = execute(wanted, directory, advance, workers=workers)
     if as_json:
         _print_json(document)
     else:
@@ -146,6 +179,71 @@ def track(
 
 
 @app.command()
+def generate(
+    scenario: ScenarioName,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="New or empty, or begun by the same command: it goes on.")
+    ],
+    layout: Annotated[Format, typer.Option("--format", help="Whose layout.")] = Format.MOT,
+    count: Annotated[int, typer.Option(metavar="N", help="How many drives.")] = 1,
+    seed: Annotated[int, typer.Option(metavar="N", help="The first drive.")] = 0,
+    frames: Annotated[Coding, typer.Option(help="PNG and FFV1 lose nothing.")] = Coding.PNG,
+    jobs: Jobs = 1,
+    cluster: Cluster = None,
+    overrides: Overrides = None,
+    as_json: Json = False,
+) -> None:
+    """Write drives as a dataset: pictures, boxes, masks, depth, calibration, poses, occlusions."""
+    if count < 1:
+        raise InputError(f"--count {count}: wanted a whole number of at least 1")
+    first = _seeds(seed, None).start
+    _check_jobs(jobs, cluster)
+    from scenarios import spec
+
+    resolved = spec.load(scenario, overrides or ())
+    from scenarios.dataset import Dataset
+    from scenarios.generate import generate as write
+    from scenarios.workers import open_workers
+
+    dataset = Dataset(
+        scenario=resolved, seeds=range(first, first + count), format=layout.value, coding=frames.value
+    )
+    with (
+        open_workers(min(jobs, count), cluster) as workers,
+        _progress(resolved.name, dataset.frames) as advance,
+    ):
+        document = write(dataset, out.absolute(), workers, advance)
+    if as_json:
+        _print_json(document)
+    else:
+        print(f"{document['episodes']} episodes, {document['frames']} frames in {out}")
+
+
+@app.command()
+def replay(
+    manifest: Annotated[
+        Path, typer.Argument(metavar="MANIFEST", help="A manifest.json, of run or generate.")
+    ],
+    as_json: Json = False,
+) -> None:
+    """Run what a manifest describes again, and say whether all comes out the same, or what differs first."""
+    from scenarios import manifest as manifests
+    from scenarios.replay import describe
+    from scenarios.replay import replay as run_again
+
+    made = manifests.read(manifest)
+    with _progress(made.scenario.name, made.frames) as advance:
+        document = describe(made, run_again(made, advance))
+    if as_json:
+        _print_json(document)
+    else:
+        from scenarios.tables import print_replay
+
+        print_replay(document)
+    raise typer.Exit(0 if document["agree"] else CANNOT)
+
+
+@app.command()
 def doctor(as_json: Json = False) -> None:
     """Say what works here, what does not, and the command that mends it."""
     from scenarios.doctor import examine
@@ -174,14 +272,21 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted", INTERRUPTED)
     except RuntimeError as error:
-        if type(error).__name__ != "RenderUnavailableError":
+        if type(error).__name__ not in CANNOT_BE_DONE:
             raise
-        _fail(str(error), 1)
+        _fail(str(error), CANNOT)
 
 
 def _fail(message: str, code: int) -> NoReturn:
     print(f"testtrack: {' '.join(message.split())}", file=sys.stderr)
     sys.exit(code)
+
+
+def _check_jobs(jobs: int, cluster: str | None) -> None:
+    if jobs < 1:
+        raise InputError(f"--jobs {jobs}: wanted a whole number of at least 1")
+    if jobs > 1 and cluster is not None:
+        raise InputError("--jobs and --cluster: wanted one of them")
 
 
 def _seeds(seed: int | None, seeds: str | None) -> range:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios import bridge
+from scenarios import bridge, digest
+from scenarios.errors import InputError
 from scenarios.log import EpisodeLog, TraceLog
 from scenarios.shown import ShownRows
 from scenarios.spec import Scenario, spec_id
@@ -68,8 +69,13 @@ def run_episode(
 
 
 def make_scene(scenario: Scenario, seed: int) -> Scene:
-    """Populate the world of a scenario for one seed."""
+    """Populate the world of a scenario for one seed.
+
+    Raises:
+        InputError: If its recording is missing or too short.
+    """
     # With the traffic and the meshes: heavy.
+    from sim.recorded import RecordingError
     from sim.scenes.aerial import AerialScene
     from sim.scenes.in_car import InCarScene
     from sim.scenes.motorcycle_lane import MotorcycleLaneScene
@@ -77,7 +83,10 @@ def make_scene(scenario: Scenario, seed: int) -> Scene:
     if isinstance(scenario.params, InCarParams):
         return InCarScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
     if isinstance(scenario.params, AerialParams):
-        return AerialScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
+        try:
+            return AerialScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
+        except RecordingError as error:
+            raise InputError(str(error)) from error
     return MotorcycleLaneScene(scenario.params, seed=seed, rate=scenario.rate)
 
 
@@ -108,8 +117,8 @@ def track_observations(
         truths.append(observation.truth)
         ego_speed.append(np.nan if ego is None else ego.speed)
         light.append(bridge.light_level(observation.state.lighting))
-        _digest(truth_hash, observation.truth)
-        _digest(frames_hash, observation.image)
+        digest.add(truth_hash, observation.truth)
+        digest.add(frames_hash, observation.image)
         for stage in _SHARED_STAGES:
             shared_ms[stage].append(observation.timing_ms[stage])
         shared_ms["truth"][-1] += _milliseconds_since(started)
@@ -191,12 +200,12 @@ class TrackerLog:
         diagnostics = getattr(self.tracker, "diagnostics", None) or Diagnostics()
         tracks = _copied(tracks)
         self.tracks.append(tracks)
-        _digest(self.digest, tracks)
+        digest.add(self.digest, tracks)
         if observation is not None:
             self.shown.add(diagnostics, observation.ids, observation.truth)
         if diagnostics.traces is not None:
             traces = _copied(diagnostics.traces)
-            _digest(self.digest, traces)
+            digest.add(self.digest, traces)
             if observation is not None:
                 votes = bridge.votes(traces, observation.ids, observation.depth, observation.truth)
                 self.traces.add(frame.tick, traces, votes)
@@ -239,18 +248,6 @@ def _copied(value: _Arrays) -> _Arrays:
     """Return a dataclass of arrays with copies of them: a tracker may go on writing into its own."""
     arrays: dict[str, Any] = {f.name: getattr(value, f.name) for f in fields(value)}
     return replace(value, **{name: array.copy() for name, array in arrays.items() if array is not None})
-
-
-def _digest(digest: hashlib._Hash, value: object) -> None:
-    """Add an array, or a dataclass of arrays and numbers: names, types, shapes and bytes."""
-    named = (
-        {f.name: getattr(value, f.name) for f in fields(value)} if is_dataclass(value) else {"array": value}
-    )
-    for name, part in named.items():
-        if part is not None:
-            array = np.ascontiguousarray(part)
-            digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
-            digest.update(array.data)
 
 
 def _milliseconds_since(started: float) -> float:

@@ -53,9 +53,15 @@ def write_json(path: Path, document: object) -> None:
     path.write_text(to_json(document) + "\n", "utf-8")
 
 
-def to_json(document: object) -> str:
-    """Return a document as strict JSON: NumPy's numbers as plain ones, infinite or no numbers as null."""
-    return json.dumps(_plain(document), indent=2, allow_nan=False)
+def to_json(document: object, *, indent: int | None = 2) -> str:
+    """Return a document as strict JSON: NumPy's numbers as plain ones, infinite or no numbers as null.
+
+    Args:
+        document: Of dictionaries, sequences, arrays, numbers and text.
+        indent: Spaces a level; None writes one line without any.
+    """
+    separators = (",", ":") if indent is None else None
+    return json.dumps(_plain(document), indent=indent, separators=separators, allow_nan=False)
 
 
 def _plain(value: Any) -> Any:

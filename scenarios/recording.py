@@ -13,8 +13,9 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.loop import TrackerLog
 from scenarios.output import write_json
-from scenarios.runs import Progress, make_tracker, peak_rss_mb
+from scenarios.runs import make_tracker, peak_rss_mb
 from scenarios.video import Video
+from scenarios.workers import Progress
 from tracker.types import Frame, Info, Intrinsics, Status
 
 if TYPE_CHECKING:

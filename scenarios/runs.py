@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import hashlib
-import multiprocessing
-import os
 import resource
-import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from scenarios import manifest as manifests
 from scenarios.errors import InputError
 from scenarios.log import EpisodeLog, save
 from scenarios.loop import run_episode
 from scenarios.output import write_json
 from scenarios.score.params import Boxes, ScoringParams
 from scenarios.spec import Scenario
+from scenarios.workers import Progress, ThisProcess, Workers
 from tracker.base import Tracker
 from tracker.registry import make
 from tracker.types import Diagnostics, Tracks
@@ -33,8 +32,6 @@ if TYPE_CHECKING:
 
 SCORING = ScoringParams()
 Document = dict[str, Any]
-Progress = Callable[[int], None]
-"""Is told how many more frames are done."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +44,6 @@ class Run:
         trackers: Names, each once.
         boxes: Which truth is scored.
         odometry: Whether the trackers get the car's noisy odometry.
-        jobs: Processes.
     """
 
     scenario: Scenario
@@ -55,20 +51,20 @@ class Run:
     trackers: tuple[str, ...]
     boxes: Boxes = "amodal"
     odometry: bool = False
-    jobs: int = 1
 
     @property
     def frames(self) -> int:
         """Frames to be rendered."""
         return len(self.seeds) * self.scenario.frames
 
+    def seed_folder(self, directory: Path, seed: int) -> Path:
+        """Return where one episode is kept: a folder of its own where there are several."""
+        return directory / f"seed-{seed}" if len(self.seeds) > 1 else directory
+
     def folder(self, directory: Path, seed: int, tracker: str) -> Path:
-        """Return where one episode of one tracker is kept: a folder of its own where there are several."""
-        if len(self.seeds) > 1:
-            directory /= f"seed-{seed}"
-        if len(self.trackers) > 1:
-            directory /= tracker.replace(":", "-").replace("/", "-")
-        return directory
+        """Return where one episode of one tracker is kept."""
+        folder = self.seed_folder(directory, seed)
+        return folder / tracker.replace(":", "-").replace("/", "-") if len(self.trackers) > 1 else folder
 
 
 def make_tracker(name: str) -> Tracker:
@@ -85,13 +81,21 @@ def make_tracker(name: str) -> Tracker:
         raise InputError(f"no tracker {name!r}: calling it without arguments fails: {error}") from error
 
 
-def execute(run: Run, directory: Path | None = None, progress: Progress | None = None) -> Document:
+def execute(
+    run: Run,
+    directory: Path | None = None,
+    progress: Progress | None = None,
+    *,
+    workers: Workers | None = None,
+) -> Document:
     """Run everything and return the document that ``--json`` prints.
 
     Args:
-        run: What to run. The scores do not depend on its ``jobs``.
+        run: What to run.
         directory: Where to write what is kept of the episodes; None keeps nothing.
         progress: Called now and then, in this process.
+        workers: Who runs the episodes, this process if None; the scores do not depend on it. All of them must
+            see the directory.
 
     Raises:
         InputError: If there is no such tracker.
@@ -101,7 +105,14 @@ def execute(run: Run, directory: Path | None = None, progress: Progress | None =
 
     for name in run.trackers:
         make_tracker(name)
-    by_seed = dict(_episodes(run, directory, progress))
+    by_seed = dict(
+        (workers or ThisProcess()).each(
+            partial(run_seed, run, directory),
+            run.seeds,
+            frames=run.scenario.frames,
+            progress=progress,
+        )
+    )
     episodes = {name: [by_seed[seed][name] for seed in run.seeds] for name in run.trackers}
     runs = [_joined(documents) for documents in episodes.values()]
     document = runs[0]
@@ -110,21 +121,25 @@ def execute(run: Run, directory: Path | None = None, progress: Progress | None =
         document = {"runs": runs, "paired": paired(scores)}
     if directory is not None:
         write_json(directory / "scores.json", document)
+        if len(run.seeds) > 1:
+            _join_manifests(run, directory)
         if len(run.seeds) * len(run.trackers) > 1:
             _summarise(run, directory, document)
     return document
 
 
 def run_seed(
-    run: Run, seed: int, directory: Path | None, progress: Progress | None = None
+    run: Run, directory: Path | None, seed: int, *, progress: Progress | None = None
 ) -> dict[str, Document]:
     """Run one episode, write what is kept of it, and return the document of each tracker by its name."""
     from scenarios.score.summary import score
 
+    if directory is not None and not directory.is_dir():
+        raise InputError(f"--out: a worker does not see {directory.parent}; wanted a folder that all share")
     trackers = {name: make_tracker(name) for name in run.trackers}
     documents = {}
     with ExitStack() as stack:
-        recorders = {}
+        recorders, chain = {}, manifests.Chain()
         if directory is not None:
             for name in trackers:
                 recorder = _recorder(run, seed, name, run.folder(directory, seed, name))
@@ -134,6 +149,8 @@ def run_seed(
             for name, recorder in recorders.items():
                 tracks, diagnostics = shown[name]
                 recorder.frame(observation.image, tracks, diagnostics, observation.truth)
+            if directory is not None:
+                chain.add(observation, {name: tracks for name, (tracks, _) in shown.items()})
             if progress is not None:
                 progress(1)
 
@@ -143,7 +160,28 @@ def run_seed(
             documents[log.tracker] = _document(run, log, scores, difficulty)
             if directory is not None:
                 _keep(run, log, documents[log.tracker], recorders[log.tracker])
+        if directory is not None:
+            made = _manifest(run, seed, chain)
+            manifests.write(run.seed_folder(directory, seed) / manifests.NAME, made)
     return documents
+
+
+def _manifest(run: Run, seed: int, chain: manifests.Chain) -> manifests.Manifest:
+    return manifests.Manifest(
+        scenario=run.scenario,
+        trackers=run.trackers,
+        odometry=run.odometry,
+        environment=manifests.environment(),
+        episodes={seed: chain.frames},
+    )
+
+
+def _join_manifests(run: Run, directory: Path) -> None:
+    folders = [run.seed_folder(directory, seed) for seed in run.seeds]
+    if not all((folder / manifests.NAME).is_file() for folder in folders):
+        raise InputError("--out: the workers do not write to the same folder; wanted one that all share")
+    made = [manifests.read(folder / manifests.NAME) for folder in folders]
+    manifests.write(directory / manifests.NAME, manifests.join(made))
 
 
 def _summarise(run: Run, directory: Path, document: Document) -> None:
@@ -232,36 +270,3 @@ def _joined(documents: list[Document]) -> Document:
         "fps": float(frames.sum() / sum(d["frames"] / d["fps"] for d in documents)),
         "peak_rss_mb": max(d["peak_rss_mb"] for d in documents),
     }
-
-
-def _episodes(
-    run: Run, directory: Path | None, progress: Progress | None
-) -> Iterator[tuple[int, dict[str, Document]]]:
-    """Yield each seed's documents, in the order in which they are ready."""
-    jobs = min(run.jobs, len(run.seeds))
-    if jobs == 1:
-        for seed in run.seeds:
-            yield seed, run_seed(run, seed, directory, progress)
-        return
-    # The workers share the cores: each draws on one thread. Mesa reads this when its first context is made,
-    # and spawned processes inherit it before they import anything.
-    os.environ["LP_NUM_THREADS"] = "1"
-    spawn = multiprocessing.get_context("spawn")  # a forked process would hang in GL
-    with ProcessPoolExecutor(jobs, mp_context=spawn, initializer=_quiet_interrupt) as pool:
-        try:
-            futures = {pool.submit(run_seed, run, seed, directory): seed for seed in run.seeds}
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-                if progress is not None:
-                    progress(run.scenario.frames)
-        except BaseException:
-            # Whoever waits for the pool would wait for whole episodes.
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in multiprocessing.active_children():
-                process.terminate()
-            raise
-
-
-def _quiet_interrupt() -> None:
-    """Let an interrupt end a worker without a word: the parent is interrupted too, and speaks for all."""
-    signal.signal(signal.SIGINT, lambda _number, _frame: os._exit(130))

@@ -134,6 +134,27 @@ def load(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         key, value = _parse_override(override)
         _put(data, key, value, override)
         set_by[key] = override
+    return _resolve(name, data, where, set_by)
+
+
+def from_document(document: object, where: str) -> Scenario:
+    """Take a resolved scenario back from JSON, as ``Scenario.model_dump(mode="json")`` writes it.
+
+    Args:
+        document: What was read.
+        where: The place, for messages.
+
+    Raises:
+        SpecError: If it is no scenario, or a key or a value is wrong.
+    """
+    if not isinstance(document, dict) or not isinstance(document.get("params"), dict):
+        raise SpecError(f"{where}: holds no resolved scenario")
+    data = {key: value for key, value in document.items() if key not in ("name", "params")}
+    return _resolve(str(document.get("name")), data | document["params"], where, {})
+
+
+def _resolve(name: str, data: dict[str, Any], where: str, set_by: Mapping[str, str]) -> Scenario:
+    """Check the keys and values of a scenario file; ``set_by`` has the overrides by their keys."""
     layout = _layout(data, where)
     try:
         checked = layout.file.model_validate(data, strict=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -24,6 +25,16 @@ def print_names(scenarios: Mapping[str, str], trackers: Iterable[str]) -> None:
     for name in trackers:
         table.add_row(name)
     console.print(table)
+
+
+def print_replay(document: Mapping[str, Any]) -> None:
+    """Print what `scenarios.replay.describe` returns: what differs first, after what was changed since."""
+    for name, value in document["environment_changed"].items():
+        print(f"{name} was {value['then']}, is {value['now']}", file=sys.stderr)
+    if document["agree"]:
+        print(f"all agree: {document['episodes']} episodes, {document['frames']} frames")
+    else:
+        print("seed {seed}, frame {frame} diverges first: {stage}".format(**document["diverges"]))
 
 
 def print_scores(document: Mapping[str, Any]) -> None:

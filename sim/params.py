@@ -115,6 +115,8 @@ class SensorParams(Params):
     """Standard deviation at mid grey, of 255."""
     blur: NonNegative = 0.6
     """Lens blur, standard deviation, px."""
+    sharpening: NonNegative = 0.8
+    """By the camera's own processing: share of the difference from a blurred picture that is added."""
     vignetting: Fraction = 0.25
     """Loss of light in the corners."""
     exposure_lag: NonNegative = 0.5
@@ -270,9 +272,9 @@ class AerialTrafficParams(TrafficParams):
     vans: Fraction = 0.10
     lorries: Fraction = 0.07
     buses: Fraction = 0.02
-    waves: Fraction = 0.6
+    waves: Fraction = 0.92
     """How much slower than free traffic the troughs of the waves are that run through a dense stream."""
-    lookalikes: Fraction = 0.6
+    lookalikes: Fraction = 0.85
     """Share of the vehicles that are of one of `looks` models and paints."""
     looks: Annotated[int, Field(ge=1, le=8)] = 2
     convoy: Annotated[int, Field(ge=0, le=20)] = 0

@@ -19,8 +19,6 @@ _DAY_LEVEL, _NIGHT_LEVEL = 112.0, 9.0
 _DAY_GAIN, _NIGHT_GAIN = (0.72, 1.35), (0.8, 1.25)
 _WIPER_SECONDS = 1.6
 _GLARE = 0.35
-_SHARPENING = 0.8
-"""Of the camera's own processing: share of the difference from a blurred picture that is added."""
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -151,9 +149,11 @@ class Sensor:
             image = self._through_rain(image, tick, speed)
         if self._params.blur > 0:
             image = np.asarray(cv2.GaussianBlur(image, (0, 0), self._params.blur))
-        image = np.asarray(
-            cv2.addWeighted(image, 1 + _SHARPENING, cv2.GaussianBlur(image, (0, 0), 1.1), -_SHARPENING, 0)
-        )
+        if self._params.sharpening > 0:
+            share = self._params.sharpening
+            image = np.asarray(
+                cv2.addWeighted(image, 1 + share, cv2.GaussianBlur(image, (0, 0), 1.1), -share, 0)
+            )
         if self._light.night:
             image = _glare(image)
         gain = self._exposure(image, tick)

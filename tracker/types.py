@@ -140,6 +140,19 @@ class Predictions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Association:
+    """How probably each of N tracks is where each of M detections is.
+
+    Attributes:
+        ids: (N,) int64, of the tracks that the frame began with.
+        beta: (N, M + 1) float64: that it was missed, then that each detection is its own; rows sum to 1.
+    """
+
+    ids: NDArray[np.int64]
+    beta: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnostics:
     """What a tracker may show of its inner state after a step; every field is optional.
 
@@ -147,6 +160,8 @@ class Diagnostics:
         traces: Paper 1's traces.
         detections: (M, 4) float64 boxes.
         mask: (H, W) bool, foreground.
+        background: (H, W, 3) uint8, RGB, what is learnt to lie behind the foreground.
+        association: Of the tracks that the frame began with and ``detections``.
         predictions: Of hidden objects.
         homography: (3, 3) from this frame to the mosaic.
         flags: (F,) int64, ids of tracks flagged as going the wrong way.
@@ -156,6 +171,8 @@ class Diagnostics:
     traces: Traces | None = None
     detections: NDArray[np.float64] | None = None
     mask: NDArray[np.bool_] | None = None
+    background: NDArray[np.uint8] | None = None
+    association: Association | None = None
     predictions: Predictions | None = None
     homography: NDArray[np.float64] | None = None
     flags: NDArray[np.int64] | None = None

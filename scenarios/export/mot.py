@@ -1,19 +1,75 @@
 """MOTChallenge text: one line a box, ``frame, id, left, top, width, height, confidence, -1, -1, -1``.
 
 Frames count from 1. Left and top are x0 and y0 as they are, unshifted, in truth and tracks alike
-(scoring.md 3).
+(scoring.md 3). The truth of a dataset, ``gt.txt``, has amodal boxes clipped to the frame, and its lines end
+with ``mark, class, visibility``: marked 1 where so much of the vehicle can be seen that it is to be found,
+else 0. The class is always 1, the one that the benchmark and TrackEval evaluate.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path, PurePosixPath
+from typing import ClassVar
 
 import numpy as np
 
+from scenarios.export.episode import Episode, FrameRecord
 from scenarios.files import moved_in
+from scenarios.score.params import ScoringParams
+from scenarios.score.preprocess import clip
+from tracker.boxes import box_area
 from tracker.types import Status, Tracks
+
+SPLIT = "testtrack-train"
+"""Folder of the sequences, as TrackEval names it: benchmark and split."""
+MIN_VISIBLE = ScoringParams().min_visible
+
+
+class MotLayout:
+    """Sequences as MOTChallenge lays them out."""
+
+    first: ClassVar[int] = 1
+
+    def folder(self, name: str) -> PurePosixPath:
+        """See `Layout.folder`."""
+        return PurePosixPath(SPLIT, name, "img1")
+
+    def write_episode(self, root: Path, episode: Episode) -> None:
+        """See `Layout.write_episode`."""
+        folder = root / SPLIT / episode.name
+        (folder / "gt").mkdir(parents=True)
+        lines = (line for k, frame in enumerate(episode.frames, start=1) for line in _gt(k, frame, episode))
+        (folder / "gt" / "gt.txt").write_text("".join(lines), "ascii")
+        place = episode.images.place
+        info = {
+            "name": episode.name,
+            "imDir": place.name,
+            "frameRate": episode.rate,
+            "seqLength": len(episode.frames),
+            "imWidth": episode.camera.width,
+            "imHeight": episode.camera.height,
+            "imExt": place.suffix or ".png",
+        }
+        text = "".join(f"{key}={value}\n" for key, value in info.items())
+        (folder / "seqinfo.ini").write_text(f"[Sequence]\n{text}", "ascii")
+
+    def write_index(self, root: Path, names: Sequence[str], frames: int) -> None:  # noqa: ARG002
+        """Write TrackEval's list of the sequences."""
+        (root / "seqmaps").mkdir(exist_ok=True)
+        with moved_in(root / "seqmaps" / f"{SPLIT}.txt") as part:
+            part.write_text("".join(f"{line}\n" for line in ("name", *names)), "ascii")
+
+
+def _gt(number: int, frame: FrameRecord, episode: Episode) -> Iterator[str]:
+    truth = frame.truth
+    boxes = clip(truth.box_amodal, episode.camera.width, episode.camera.height)
+    for k in np.flatnonzero(box_area(boxes) > 0):
+        x0, y0, x1, y1 = boxes[k]
+        mark = int(truth.visible[k] >= MIN_VISIBLE)
+        numbers = ",".join(f"{value:.4f}" for value in (x0, y0, x1 - x0, y1 - y0))
+        yield f"{number},{frame.track_ids[k]},{numbers},{mark},1,{truth.visible[k]:.4f}\n"
 
 
 def write_tracks(path: Path | str, frames: Iterable[Tracks]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,8 @@ def annotate(
     traces: Traces | None,
     truth_boxes: NDArray[np.float64] | None,
     caption: str,
+    scale: int = 1,
+    strip: int = STRIP,
 ) -> NDArray[np.uint8]:
     """Draw boxes, support points and trace ticks.
 
@@ -37,20 +41,24 @@ def annotate(
         traces: What else it showed, or None.
         truth_boxes: (N, 4) boxes of the scored objects, px, or None.
         caption: Written into the upper left corner.
+        scale: The picture is drawn so many times as large; lines and letters stay as they are.
+        strip: Height of the strip of ticks, px; 0 for a tracker without traces.
 
     Returns:
-        (H + `STRIP`, W, 3) uint8 RGB.
+        (scale H + strip, scale W, 3) uint8 RGB.
     """
+    if scale > 1:
+        image = enlarged(image, scale)
     height, width = image.shape[:2]
-    canvas = np.empty((height + STRIP, width, 3), np.uint8)
+    canvas = np.empty((height + strip, width, 3), np.uint8)
     canvas[:height] = image
     canvas[height:] = 22
     picture = canvas[:height]
     for box in truth_boxes if truth_boxes is not None else ():
-        _rectangle(picture, box, TRUTH, 1)
-    if traces is not None:
+        _rectangle(picture, scale * box, TRUTH, 1)
+    if traces is not None and strip:
         _draw_traces(canvas, height, traces)
-    for track, box, status in zip(tracks.ids, tracks.boxes, tracks.status, strict=True):
+    for track, box, status in zip(tracks.ids, scale * tracks.boxes, tracks.status, strict=True):
         colour = rgb(identity(int(track)))
         if status == Status.CONFIRMED:
             _rectangle(picture, box, colour, 2)
@@ -62,6 +70,23 @@ def annotate(
     (wide, _), _ = cv2.getTextSize(caption, _FONT, 0.4, 1)
     cv2.rectangle(canvas, (0, 0), (wide + 11, 17), (22, 22, 22), cv2.FILLED)
     cv2.putText(canvas, caption, (6, 13), _FONT, 0.4, (235, 238, 242), 1, cv2.LINE_AA)
+    return canvas
+
+
+def enlarged(image: NDArray[np.uint8], scale: int) -> NDArray[np.uint8]:
+    """Return a picture ``scale`` times as wide and high."""
+    return np.asarray(cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
+def draw_measurements(
+    image: NDArray[np.uint8], boxes: NDArray[np.float64], names: Sequence[str]
+) -> NDArray[np.uint8]:
+    """Return a copy of ``image`` with thin white boxes (N, 4), px, and as many names as are given."""
+    canvas = image.copy()
+    for box in boxes:
+        _rectangle(canvas, box, TRUTH, 1)
+    for box, name in zip(boxes, names, strict=False):
+        _tag(canvas, box, name, TRUTH)
     return canvas
 
 

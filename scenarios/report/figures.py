@@ -14,7 +14,7 @@ from scenarios.report import plots
 from scenarios.report.history import TraceSamples
 from scenarios.report.palette import CLASSES, LABELS
 from scenarios.report.plots import Plot
-from scenarios.report.series import Series, measure
+from scenarios.report.series import Series, follow_riders, foreground_series, measure
 from scenarios.score.params import Boxes
 from tracker.types import Status
 
@@ -43,6 +43,7 @@ class Drawn:
         maps_note: What they show.
         classes: Names of the classes whose samples are on the maps.
         times: Over time.
+        riders: Which track was on each rider of a lane, or None.
     """
 
     profiles: list[Plot]
@@ -50,6 +51,7 @@ class Drawn:
     maps_note: str
     classes: list[str]
     times: list[Plot]
+    riders: Plot | None
 
 
 def draw(recording: Recording, *, log: EpisodeLog | None, boxes: Boxes, scenario: Mapping[str, Any]) -> Drawn:
@@ -64,7 +66,17 @@ def draw(recording: Recording, *, log: EpisodeLog | None, boxes: Boxes, scenario
         maps_note=note,
         classes=list(by_class),
         times=_times(recording, samples, log, series),
+        riders=_riders(log, boxes) if log is not None and log.scene == "motorcycle-lane" else None,
     )
+
+
+def _riders(log: EpisodeLog, boxes: Boxes) -> Plot | None:
+    """Draw which track was on each rider, frame by frame."""
+    followed = follow_riders(log, boxes=boxes)
+    if not followed:
+        return None
+    svg, time = plots.lives(followed, rate=log.rate, seconds=len(log.truth) / log.rate)
+    return Plot(title="", caption="", svg=svg, time=time)
 
 
 def _profiles(recording: Recording, samples: TraceSamples) -> list[Plot]:
@@ -160,7 +172,7 @@ def _times(
         drawn.append(Plot(title=title, caption=caption, svg=drawing[0], time=drawing[1]))
 
     if series is not None and log is not None and log.has_boxes and len(series.scored) == len(times):
-        most = max(series.scored.max(initial=1), series.false.max(initial=1))
+        most = max(np.nanmax(counts, initial=1) for counts in (series.scored, series.false))
         counts = {"scored": series.scored, "matched": series.matched, "false": series.false}
         add(
             "Objects",
@@ -179,6 +191,17 @@ def _times(
             "Overlap of matches",
             "Mean IoU of matched boxes.",
             plots.lines({"IoU": (times, series.overlap)}, seconds=seconds, label="mean IoU", limits=(0, 1)),
+        )
+    if log is not None and (foreground := foreground_series(log)) is not None:
+        add(
+            "Foreground",
+            "Precision and recall of the foreground mask's pixels, shadows apart; the training is left out.",
+            plots.lines(
+                {name: (times, values) for name, values in foreground.items()},
+                seconds=seconds,
+                label="share",
+                limits=(0, 1.02),
+            ),
         )
     if len(samples.ids):
         add(*_traces(samples, recording, seconds))

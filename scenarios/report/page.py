@@ -15,15 +15,20 @@ from markupsafe import Markup
 from scenarios.log import EpisodeLog
 from scenarios.report import figures
 from scenarios.report.history import History
+from scenarios.report.moment import Moment, association, pictures
 from scenarios.report.palette import DOTS, LABELS, NO_TRACK
+from scenarios.report.pictures import Picture
+from scenarios.report.series import scored_boxes
 from scenarios.report.tables import (
     BOX_SCORES,
+    LANE_SCORES,
     MEANINGS,
     TILE_COUNT,
     TILES,
     Row,
     attribute_notes,
     is_group,
+    lane_tables,
     number,
     parameter_rows,
     plain_rows,
@@ -34,26 +39,6 @@ from scenarios.score.params import ScoringParams
 
 _FILM_MARKER = "<film>"  # text from outside is escaped, so that it cannot hold this
 _CHUNK = 3 << 18
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """A picture with words beneath it.
-
-    Attributes:
-        title: The words.
-        data: The file's bytes.
-        media: Its media type.
-    """
-
-    title: str
-    data: bytes
-    media: str = "image/png"
-
-    @property
-    def base64(self) -> str:
-        """The bytes as text."""
-        return base64.b64encode(self.data).decode()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +54,8 @@ class Recording:
         film: The video, or None where no frame came.
         film_frames: How many frames are in it.
         stills: Single frames.
+        moment: A frame of a lane with what its tracker made of it, or None.
+        has_traces: Whether the tracker showed traces.
         figures: More pictures to show.
         focal: Px, or None where it is not known.
     """
@@ -81,6 +68,8 @@ class Recording:
     film: Path | None
     film_frames: int
     stills: tuple[Picture, ...]
+    moment: Moment | None
+    has_traces: bool
     figures: tuple[Picture, ...]
     focal: float | None
 
@@ -127,6 +116,7 @@ def write_page(
     values: Mapping[str, Any] = document.get("scores") or {}
     has_boxes = log is None or log.has_boxes
     has_traces = log is None or log.traces is not None
+    moment = recording.moment
     drawn = figures.draw(recording, log=log, boxes=document.get("boxes", "amodal"), scenario=scenario)
     html = (
         environment()
@@ -140,7 +130,9 @@ def write_page(
             film_marker=Markup(_FILM_MARKER),
             film_note=_film_note(recording),
             has_truth=log is not None,
-            label_colours=[(label.name.lower(), colour) for label, colour in LABELS.items()],
+            label_colours=[(label.name.lower(), colour) for label, colour in LABELS.items()]
+            if recording.has_traces
+            else [],
             map_colours=[(name, DOTS[name]) for name in drawn.classes],
             no_track=NO_TRACK,
             tiles=_tiles(values, has_boxes=has_boxes, has_traces=has_traces),
@@ -148,6 +140,10 @@ def write_page(
             confusion=confusion(values),
             facts=plain_rows(_facts(document)) if not values else [],
             difficulty=plain_rows(document.get("difficulty") or {}),
+            lane_tables=lane_tables([(document.get("tracker", ""), values)]),
+            moment=_moment_pictures(moment, recording, log) if moment is not None else [],
+            association=association(moment) if moment is not None else None,
+            riders=drawn.riders,
             profiles=drawn.profiles,
             maps=drawn.maps,
             maps_note=drawn.maps_note,
@@ -168,6 +164,13 @@ def write_page(
         if recording.film is not None:
             _write_base64(file, recording.film)
         file.write(after)
+
+
+def _moment_pictures(moment: Moment, recording: Recording, log: EpisodeLog | None) -> list[Picture]:
+    truth = None
+    if log is not None:
+        truth = scored_boxes(log.truth[moment.index], log.width, log.height, log.scene)
+    return pictures(moment, truth, moment.index / recording.rate)
 
 
 def _write_base64(file: IO[str], source: Path) -> None:
@@ -212,7 +215,9 @@ def _facts(document: Mapping[str, Any]) -> dict[str, Any]:
 def _tiles(values: Mapping[str, Any], *, has_boxes: bool, has_traces: bool) -> list[Row]:
     """Return the scores that the page begins with: those of them that this tracker can have."""
     leaves = dict(values) | dict(values.get("identification") or {})
-    names = [name for name in TILES if name in leaves and (has_boxes if name in BOX_SCORES else has_traces)]
+    leaves |= {f"detection_{name}": value for name, value in (values.get("detection") or {}).items()}
+    given = {name: has_boxes if name in BOX_SCORES else has_traces for name in TILES}
+    names = [name for name in TILES if name in leaves and (name in LANE_SCORES or given[name])]
     return [
         score_row(name, leaves[name], has_boxes=has_boxes, has_traces=has_traces)
         for name in names[:TILE_COUNT]

@@ -27,6 +27,9 @@ NO_TRACK = "#6b7280"
 SERIES = ("#3b82f6", "#f59e0b", "#10b981", "#a855f7", "#ef4444", "#06b6d4")
 """Of lines in plots that are neither."""
 
+FOREGROUND = "#ff9f1c"
+"""Of pixels in a foreground mask."""
+
 TRUTH: Rgb = (255, 255, 255)
 
 

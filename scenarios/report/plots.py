@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from scenarios.report.history import TraceSamples
 from scenarios.report.palette import DOTS, LABELS, NO_TRACK, SERIES, identity
+from scenarios.report.series import FollowedRider
 from scenarios.report.svg import draw_svg
 from tracker.types import Label
 
@@ -234,6 +235,47 @@ def lines(
         _finish_lines(axes, seconds, label, limits, legend=len(series) > 1)
 
     return _over_time(draw, seconds)
+
+
+def lives(riders: Sequence[FollowedRider], *, rate: float, seconds: float) -> tuple[Markup, TimeAxis]:
+    """Draw a line for each rider, coloured by the track on it, with the id where a track begins.
+
+    Args:
+        riders: In the order in which they came.
+        rate: Frames a second.
+        seconds: Length of the episode.
+    """
+    height = 0.75 + 0.135 * len(riders)
+
+    def draw(axes: Axes) -> None:
+        for row, rider in enumerate(riders):
+            cuts = np.flatnonzero((np.diff(rider.tracks) != 0) | (np.diff(rider.frames) > 1)) + 1
+            bounds = [0, *cuts.tolist(), len(rider.tracks)]
+            told = 0
+            for begin, end in itertools.pairwise(bounds):
+                track = int(rider.tracks[begin])
+                start, stop = rider.frames[begin] / rate, (rider.frames[end - 1] + 1) / rate
+                colour = identity(track) if track else NO_TRACK
+                bar = 0.72 if track else 0.16
+                axes.broken_barh([(start, stop - start)], (row - bar / 2, bar), color=colour, linewidth=0)
+                if track and track != told and stop - start > 0.02 * seconds:
+                    axes.text(
+                        start + 0.003 * seconds,
+                        row + 0.02,
+                        str(track),
+                        color="#0a0a0e",
+                        fontsize=5.5,
+                        va="center",
+                    )
+                    told = track
+        axes.grid(visible=False, axis="y")
+        axes.set(
+            xlim=(0, seconds), ylim=(len(riders) - 0.3, -0.7), xlabel="time, s", ylabel="riders, as they came"
+        )
+        axes.set_yticks([])
+
+    svg, (x0, _, x1, _) = draw_svg(draw, size=(10.4, height), margins=(0.34, 0.16, 0.44, 0.06))
+    return svg, TimeAxis(vertical=False, low=x0, high=x1, seconds=seconds)
 
 
 def bands(

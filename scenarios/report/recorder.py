@@ -8,7 +8,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +16,9 @@ from scenarios.log import EpisodeLog
 from scenarios.report.annotate import STRIP, annotate
 from scenarios.report.film import Film
 from scenarios.report.history import History, Thinned
-from scenarios.report.page import Picture, Recording, write_page
+from scenarios.report.moment import SCALE, MomentChooser
+from scenarios.report.page import Recording, write_page
+from scenarios.report.pictures import Picture, jpeg
 from scenarios.report.series import scored_boxes
 from sim.truth.types import FrameTruth
 from tracker.types import Diagnostics, Tracks
@@ -54,6 +55,10 @@ class Recorder:
         self.height = height
         self.rate = rate
         self.title = title
+        lane = scene == "motorcycle-lane"
+        self._scale, self._strip = (SCALE, 0) if lane else (1, STRIP)
+        self._moments = MomentChooser()
+        self._has_traces = not lane
         self._frames = 0
         self._history = History()
         self._stills = Thinned(2 * STILLS)
@@ -65,8 +70,8 @@ class Recorder:
         self._scratch = tempfile.TemporaryDirectory(prefix=".report-", dir=self.directory)
         self._film = Film(
             Path(self._scratch.name) / "film.mp4",
-            width=self.width,
-            height=self.height + STRIP,
+            width=self._scale * self.width,
+            height=self._scale * self.height + self._strip,
             rate=self.rate,
         )
         return self
@@ -98,6 +103,7 @@ class Recorder:
         self._frames += 1
         diagnostics = diagnostics or Diagnostics()
         self._history.add(index, tracks, diagnostics.profiles, diagnostics.traces)
+        self._moments.consider(index, image, tracks, diagnostics)
 
         filmed = index < FILM_SECONDS * self.rate
         kept = self._stills.wants(index)
@@ -110,11 +116,13 @@ class Recorder:
             traces=diagnostics.traces,
             truth_boxes=None if truth is None else scored_boxes(truth, self.width, self.height, self.scene),
             caption=f"{time:.2f} s",
+            scale=self._scale,
+            strip=self._strip,
         )
         if filmed:
             self._film.write(canvas)
         if kept:
-            self._kept.append(Picture(f"{time:.1f} s", _jpeg(canvas), "image/jpeg"))
+            self._kept.append(Picture(f"{time:.1f} s", jpeg(canvas), "image/jpeg"))
             if self._stills.added():
                 self._kept = self._kept[::2]
 
@@ -151,6 +159,8 @@ class Recorder:
             film=self._film.path if self._film.frames else None,
             film_frames=self._film.frames,
             stills=tuple(self._kept[int(k)] for k in choice) if self._kept else (),
+            moment=self._moments.chosen,
+            has_traces=self._has_traces,
             figures=tuple(figures),
             focal=focal,
         )
@@ -158,8 +168,3 @@ class Recorder:
         with moved_in(path) as part:
             write_page(part, recording, log=log, scores=scores, scenario=scenario)
         return path
-
-
-def _jpeg(image: NDArray[np.uint8]) -> bytes:
-    _, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 88])
-    return data.tobytes()

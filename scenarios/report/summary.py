@@ -15,7 +15,7 @@ from scenarios.files import moved_in
 from scenarios.report import plots
 from scenarios.report.page import confusion, environment
 from scenarios.report.palette import SERIES
-from scenarios.report.tables import DASH, FRACTIONS, MEANINGS, flat, number, words
+from scenarios.report.tables import DASH, FRACTIONS, MEANINGS, flat, lane_tables, number, words
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +71,7 @@ def write_summary(
             ],
             trackers=list(zip(trackers, (SERIES * len(trackers))[: len(trackers)], strict=True)),
             chart=_chart(trackers, scores),
+            lane_tables=lane_tables([(str(run["tracker"]), run["scores"]) for run in runs]),
             lines=_lines(scores, len(seeds)),
             paired=[
                 {

@@ -27,11 +27,14 @@ MEANINGS = {
     "traces_per_10s": "how much was dared",
     "oncoming_as_car": "oncoming traces labelled car",
     "foreground_f": "foreground masks against the riders' pixels, shadows apart",
-    "correct": "riders that one id follows all the way",
+    "riders": "riders to be detected, in all frames together",
+    "correct": "found, or followed by one id all the way",
+    "missed": "riders without a detection",
     "total": "riders scored for 1 s or more",
+    "lost": "riders on whom no one id is for a fifth of their frames",
     "present": "riders who come the wrong way",
     "flagged": "of them, flagged",
-    "false": "tracks flagged that are on none of them",
+    "false": "detections on no rider; tracks flagged that are on no such rider",
     "absorbed_s": "from a rider's standstill until it has left the mask",
     "recovery_s": "from a sudden change of light until the mask is calm again",
     "moving": "traces during which the camera car went 10 m or more",
@@ -42,6 +45,9 @@ TILES = (
     "hota",
     "idf1",
     "mota",
+    "detection_precision",
+    "detection_recall",
+    "detection_foreground_f",
     "car_recall",
     "background_recall",
     "median_seconds_to_identify",
@@ -53,9 +59,14 @@ TILE_COUNT = 6
 """The page begins with the first so many of these scores that a tracker can have."""
 
 BOX_SCORES = ("hota", "deta", "assa", "mota", "idf1", "id_switches", "precision", "recall")
-LANE_SCORES = ("foreground_f", "correct", "total", "present", "flagged", "false", "absorbed_s", "recovery_s")
+LANE_SCORES = (
+    *("detection_precision", "detection_recall", "detection_foreground_f"),
+    *("foreground_f", "riders", "correct", "missed", "total", "lost", "present", "flagged", "false"),
+    *("absorbed_s", "recovery_s"),
+)
 _TRACES = ("car_recall", "background_recall", "accuracy", "balanced_accuracy", "vehicle_coverage")
-FRACTIONS = frozenset((*BOX_SCORES, *_TRACES, "foreground_f")) - {"id_switches"}
+_DETECTION = ("foreground_f", "detection_precision", "detection_recall", "detection_foreground_f")
+FRACTIONS = frozenset((*BOX_SCORES, *_TRACES, *_DETECTION)) - {"id_switches"}
 """The scores that a bar is drawn for."""
 
 DASH = "–"
@@ -105,7 +116,14 @@ def words(name: str) -> str:
     """Turn a key into words: the measures' own names in capitals, others spaced."""
     if name in ("hota", "mota", "motp"):
         return name.upper()
-    special = {"deta": "DetA", "assa": "AssA", "idf1": "IDF1", "id_switches": "ID switches"}
+    special = {
+        "detection_foreground_f": "foreground F",
+        "foreground_f": "foreground F",
+        "deta": "DetA",
+        "assa": "AssA",
+        "idf1": "IDF1",
+        "id_switches": "ID switches",
+    }
     if name.endswith("_s"):
         return f"{words(name[:-2])}, s"
     return special.get(name) or name.replace("_", " ").replace("-", " ")
@@ -176,6 +194,58 @@ def parameter_rows(values: Mapping[str, Any], notes: Mapping[str, str] | None = 
         )
         for name, value in values.items()
     ]
+
+
+@dataclass(frozen=True, slots=True)
+class LaneTable:
+    """A table with a row for each tracker, as the paper prints its results."""
+
+    title: str
+    note: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, list[str]]]
+
+
+def lane_tables(runs: Sequence[tuple[str, Mapping[str, Any]]]) -> list[LaneTable]:
+    """Return detections and full tracks as in the paper's tables II and III.
+
+    Args:
+        runs: Name and scores of each tracker; no tables come of scores that are no lane's.
+    """
+    if not runs or not all("full_tracks" in scores for _, scores in runs):
+        return []
+    detections = [(name, scores["detection"]) for name, scores in runs]
+    followed = [(name, scores["full_tracks"]) for name, scores in runs]
+    return [
+        LaneTable(
+            "Detections",
+            "Riders and detections of all scored frames, matched one to one.",
+            ("true riders", "correctly detected", "false", "missed", "precision", "recall"),
+            [
+                (name, [number(d.get(key)) for key in ("riders", "correct", "false", "missed")] + shares(d))
+                for name, d in detections
+            ],
+        ),
+        LaneTable(
+            "Full tracks",
+            "Full: one id all the way. Lost: no one id for a fifth of the way. Partial: between the two.",
+            ("riders", "full", "partial", "lost", "share full"),
+            [(name, _followed(t)) for name, t in followed],
+        ),
+    ]
+
+
+def shares(detection: Mapping[str, Any]) -> list[str]:
+    """Print precision and recall."""
+    return [number(detection.get("precision")), number(detection.get("recall"))]
+
+
+def _followed(tracks: Mapping[str, Any]) -> list[str]:
+    total, full, lost = (tracks.get(key) for key in ("total", "correct", "lost"))
+    if total is None or full is None or lost is None:
+        return [DASH] * 5
+    share = full / total if total else None
+    return [number(value) for value in (total, full, total - full - lost, lost, share)]
 
 
 def attribute_notes(documented: type) -> dict[str, str]:

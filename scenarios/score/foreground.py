@@ -16,19 +16,31 @@ from sim.truth.standing import Standing
 
 def foreground_f(log: EpisodeLog, frames: Sequence[ScoredFrame], params: ScoringParams) -> float | None:
     """Give the F measure of all masks; shadows are background, what has long stood does not count."""
-    mask_px, object_px = log.shown.mask_px, log.shown.object_px
-    if mask_px is None or object_px is None:
-        return None
-    hits = marked = wanted = 0
-    for frame in frames:
-        if mask_px[frame.index] == NO_MASK:
-            continue
-        counts = frame.standing < params.standing_seconds
-        inside = object_px[frame.index]
-        hits += int(inside[counts].sum())
-        marked += int(mask_px[frame.index] - inside[~counts].sum())
-        wanted += int(frame.truth.visible_px[counts].sum())
+    hits, marked, wanted = total_counts(log, frames, params)
     return 2 * hits / (marked + wanted) if marked + wanted else None
+
+
+def total_counts(
+    log: EpisodeLog, frames: Sequence[ScoredFrame], params: ScoringParams
+) -> tuple[int, int, int]:
+    """Sum `mask_counts` over frames."""
+    counts = [found for frame in frames if (found := mask_counts(log, frame, params)) is not None]
+    hits, marked, wanted = np.array(counts, np.int64).reshape(-1, 3).sum(axis=0).tolist()
+    return hits, marked, wanted
+
+
+def mask_counts(log: EpisodeLog, frame: ScoredFrame, params: ScoringParams) -> tuple[int, int, int] | None:
+    """Count pixels of riders in the mask of one frame, of the mask, and of riders; None without a mask."""
+    mask_px, object_px = log.shown.mask_px, log.shown.object_px
+    if mask_px is None or object_px is None or mask_px[frame.index] == NO_MASK:
+        return None
+    moving = frame.standing < params.standing_seconds
+    inside = object_px[frame.index]
+    return (
+        int(inside[moving].sum()),
+        int(mask_px[frame.index] - inside[~moving].sum()),
+        int(frame.truth.visible_px[moving].sum()),
+    )
 
 
 def absorption_seconds(log: EpisodeLog, params: ScoringParams) -> float | None:

@@ -26,14 +26,9 @@ Pair = tuple[int, int]
 def lane_scores(log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams) -> dict[str, Any]:
     """Compute the scores of a lane (scoring.md 13 to 15); None where a score's input is missing."""
     frames = list(scored_frames(log, boxes=boxes, params=params))
-    precision, recall = detection(log, frames, params)
     scores: dict[str, Any] = {
-        "detection": {
-            "precision": precision,
-            "recall": recall,
-            "foreground_f": foreground_f(log, frames, params),
-        },
-        "full_tracks": {"correct": None, "total": None},
+        "detection": detection(log, frames, params) | {"foreground_f": foreground_f(log, frames, params)},
+        "full_tracks": {"correct": None, "total": None, "lost": None},
         "wrong_way": {"present": None, "flagged": None, "false": None},
         "absorbed_s": absorption_seconds(log, params),
         "recovery_s": recovery_seconds(log, params),
@@ -42,17 +37,17 @@ def lane_scores(log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringPara
         pairs = [on_riders(frame, log, params) for frame in frames]
         life = {vehicle: at for vehicle, at in lives(frames).items() if len(at) >= _least(log, params)}
         correct = full_tracks(life, pairs, params)
-        scores["full_tracks"] = {"correct": len(correct), "total": len(life)}
+        lost = len(lost_riders(life, pairs, params) - correct.keys())
+        scores["full_tracks"] = {"correct": len(correct), "total": len(life), "lost": lost}
         scores["wrong_way"] = wrong_way(log, frames, pairs, set(life))
     return scores
 
 
-def detection(
-    log: EpisodeLog, frames: Sequence[ScoredFrame], params: ScoringParams
-) -> tuple[float | None, float | None]:
-    """Give precision and recall of the detections; of each None where there is nothing to divide by."""
+def detection(log: EpisodeLog, frames: Sequence[ScoredFrame], params: ScoringParams) -> dict[str, Any]:
+    """Count detections; precision and recall are None where there is nothing to divide by."""
+    names = ("precision", "recall", "riders", "correct", "false", "missed")
     if log.shown.detections is None:
-        return None, None
+        return dict.fromkeys(names)
     hits = claimed = wanted = 0
     for frame in frames:
         selection = frame.selection
@@ -62,7 +57,8 @@ def detection(
         hits += len(matches(scored, found, params.detection_iou)[0])
         claimed += len(found)
         wanted += len(scored)
-    return hits / claimed if claimed else None, hits / wanted if wanted else None
+    precision, recall = (hits / count if count else None for count in (claimed, wanted))
+    return dict(zip(names, (precision, recall, wanted, hits, claimed - hits, wanted - hits), strict=True))
 
 
 def matches(scored: Floats, found: Floats, threshold: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -122,6 +118,17 @@ def full_tracks(
             ):
                 found[rider] = track
     return found
+
+
+def lost_riders(
+    life: dict[int, list[int]], pairs: Sequence[Sequence[Pair]], params: ScoringParams
+) -> set[int]:
+    """Find the riders on whom no single id lies for `ScoringParams.lost_share` of their scored frames."""
+    frames = Counter(pair for frame in pairs for pair in frame)
+    most: dict[int, int] = defaultdict(int)
+    for (rider, _), count in frames.items():
+        most[rider] = max(most[rider], count)
+    return {rider for rider, at in life.items() if most[rider] < params.lost_share * len(at)}
 
 
 def longest_gap(held: Sequence[bool]) -> int:

@@ -31,8 +31,11 @@ class ScoringParams:
         min_rider_seconds: Riders scored for less do not count in the full tracks.
         full_share: Least share of a rider's scored frames in which a full track is on it.
         full_gap: Most frames in a row that it may miss, and that its id may be on other riders.
+        lost_share: A rider on whom no one id is for this share of its scored frames is lost.
         absorbed_share: A rider that stands is absorbed once no more of it is in the mask.
         flash_change: Least change of the light from one frame to the next, as a part of it, that is sudden.
+        min_hidden_frames: Least frames for which a vehicle below the platform is hidden in an event ...
+        min_scored_frames: ... and for which it is scored before it, and after.
         recovered_share: A mask has recovered once no more of the background is in it ...
         recovered_seconds: ... for so long.
     """
@@ -54,7 +57,10 @@ class ScoringParams:
     min_rider_seconds: float = 1.0
     full_share: float = 0.95
     full_gap: int = 3
+    lost_share: float = 0.2
     absorbed_share: float = 0.2
     flash_change: float = 0.1
+    min_hidden_frames: int = 15
+    min_scored_frames: int = 30
     recovered_share: float = 0.05
     recovered_seconds: float = 0.5

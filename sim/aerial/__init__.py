@@ -1,1 +1,1 @@
-"""What the aerial scene is made of: networks, traffic, bridges, land, the platform that looks down on them."""
+"""What the aerial scene is made of: networks, traffic, bridges, land, and the platform above."""

@@ -45,7 +45,7 @@ class RoutedDriver(Driver):
         lane = self.road.network.get_lane(self.target_lane_index)
         own = self.path.lanes[step]
         scale = self.road.network.get_lane(own).length / lane.length
-        return self.path.starts[step] + self.place_on(lane)[0] * scale
+        return float(self.path.starts[step] + self.place_on(lane)[0] * scale)
 
     def steering_control(self, target_lane_index: LaneIndex) -> float:
         """Return the steering angle, rad (see `Driver.steering_control`)."""

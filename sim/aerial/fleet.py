@@ -7,10 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.fleet import Draw, Fleet
+from sim.fleet import Draw, Fleet, Surge
 from sim.models import Model
 from sim.params import AerialTrafficParams
 from sim.world import Kind
+
+LIVELY = (1.5, 1.25)
+"""How much harder than on an open motorway drivers in dense waves accelerate, and brake."""
+SWING = 0.12
+"""Amplitude of the swing of a driver's wanted speed, as a part of it."""
 
 
 class LookalikeFleet(Fleet):
@@ -23,13 +28,17 @@ class LookalikeFleet(Fleet):
         super().__init__(params, catalogue)
         self._share, self._sizes = params.lookalikes, [model.size for model in catalogue]
         cars = [k for k, model in enumerate(catalogue) if model.kind == Kind.CAR]
-        self.looks = tuple(
-            (cars[int(rng.integers(len(cars)))], self.paint(rng)) for _ in range(params.looks)
-        )
+        self.looks = tuple((cars[int(rng.integers(len(cars)))], self.paint(rng)) for _ in range(params.looks))
 
     def draw(self, rng: np.random.Generator, *, pace: float = 0.0, light: bool = False) -> Draw:
         """Draw one vehicle (see `Fleet.draw`)."""
         draw = super().draw(rng, pace=pace, light=light)
+        draw = replace(
+            draw,
+            acceleration=LIVELY[0] * draw.acceleration,
+            braking=LIVELY[1] * draw.braking,
+            surge=Surge.draw(rng, strength=SWING, periods=(6.0, 13.0)),
+        )
         if draw.kind != Kind.CAR or rng.random() >= self._share:
             return draw
         return self.look(draw, int(rng.integers(len(self.looks))))

@@ -18,6 +18,8 @@ LEAVE = 6.0
 """Metres before a path's end where vehicles leave."""
 COMMITTED = 2.6
 """M/s^2: who would have to brake harder for a light that turns red drives on."""
+FIRST_GREEN = (5.0, 10.0)
+"""Seconds after the traffic's beginning in which an intersection's first phase begins, after one of red."""
 
 
 @dataclass(slots=True, eq=False)
@@ -73,7 +75,9 @@ class Flows:
         self._number = 0
         self._gaps = [self._stream("entry", k) for k in range(len(network.entries))]
         self._room = [self._draw_gap(k) for k in range(len(network.entries))]
-        self._lights = Lights(network.signals, self.world, self._stream("lights")) if network.signals else None
+        self._lights = (
+            Lights(network.signals, self.world, self._stream("lights")) if network.signals else None
+        )
 
     def fill(self, *, spared: tuple[int, float, float] | None = None) -> None:
         """Populate every entry's paths as far as they are to be.
@@ -173,7 +177,6 @@ class Flows:
                 speed = min(speed, ahead.driver.speed + 2.0)
                 closing = max(speed**2 - ahead.driver.speed**2, 0.0) / 3.0
                 if room - draw.size[0] < 3.0 + 0.8 * speed + closing:
-                    self._number += 1
                     continue
             self.add(draw, k, self._way(k), middle, speed)
             self._room[k] = self._draw_gap(k)
@@ -216,10 +219,10 @@ class Lights:
     """The lights of an intersection: they put stop lines into lanes and take them out."""
 
     def __init__(self, signals: Signals, world: IndexedRoad, rng: np.random.Generator) -> None:
-        """Set them up with a stop line for each lane; the run begins somewhere in the cycle."""
+        """Set them up with a stop line for each lane; the first phase begins within `FIRST_GREEN` seconds."""
         self._signals, self._world = signals, world
         self._spans = [green + signals.clearance for green in signals.greens]
-        self._offset = float(rng.uniform(0, sum(self._spans)))
+        self._offset = -float(rng.uniform(*FIRST_GREEN))
         self._lines = {index: StopLine(world, index, along) for index, along in signals.lines.items()}
         self._red: set[tuple[str, str, int]] = set()
 

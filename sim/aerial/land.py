@@ -1,4 +1,4 @@
-"""What stands on the land: houses and halls on their plots, parked cars, woods, hedges, trees over the road."""
+"""What stands on the land: houses and halls on their plots, parked cars, woods, trees over the road."""
 
 from __future__ import annotations
 
@@ -52,7 +52,9 @@ class Land:
         self._index = {model.name: k for k, model in enumerate(models)}
         self._cars = [k for k, model in enumerate(models) if model.kind == Kind.CAR]
         rng = self._stream("leaves")
-        self._hues = LEAVES[rng.permutation(len(LEAVES))[:4]] * rng.uniform((0.80, 0.84, 0.74), (1.0, 0.98, 0.95))
+        self._hues = LEAVES[rng.permutation(len(LEAVES))[:4]] * rng.uniform(
+            (0.80, 0.84, 0.74), (1.0, 0.98, 0.95)
+        )
         self._rows: list[tuple[int, float, float, float, Floats, Floats]] = []
 
     def furnish(self, parcels: Sequence[Parcel]) -> None:
@@ -83,11 +85,12 @@ class Land:
                     for step in range(int(rng.integers(1, 4))):
                         at = min(place + 4 * step, len(strip.line) - 1)
                         away = float(rng.uniform(0.6, 1.8))
-                        self._tree(*strip.beside(edge + side * away)[at], rng, wide=1.25, keep=0.3)
+                        x, y = strip.beside(edge + side * away)[at].tolist()
+                        self._tree(x, y, rng, wide=1.25, keep=0.3)
                 for _ in range(rng.poisson(34.0 * self._params.trees * kilometres)):
                     place = int(rng.integers(len(strip.line)))
                     away = float(rng.gamma(2.0, 4.0)) + 3.0
-                    x, y = strip.beside(edge + side * away)[place]
+                    x, y = strip.beside(edge + side * away)[place].tolist()
                     if rng.random() < 0.5:
                         self._tree(x, y, rng)
                     else:
@@ -143,7 +146,9 @@ class Land:
         if self._free.room(x, y) < 1.8:
             return
         hue = self._hues[int(rng.integers(len(self._hues)))] * rng.uniform(0.8, 1.05)
-        self._add(name, x, y, float(rng.uniform(0, 6.28)), self._size(name) * rng.uniform(0.8, 1.5), hue.clip(0, 1))
+        self._add(
+            name, x, y, float(rng.uniform(0, 6.28)), self._size(name) * rng.uniform(0.8, 1.5), hue.clip(0, 1)
+        )
 
     def _wood(self, parcel: Parcel, rng: np.random.Generator) -> None:
         count = int(parcel.length * parcel.width / _WOOD_SPACING**2 * min(self._params.trees, 1.5))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +29,7 @@ RAMP = 75.0
 BATTER = 1.6
 """Metres that an embankment's sides run out for each metre that they rise."""
 _STRIPE = 0.16
+_TURF = 1.6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,9 +141,7 @@ def _deck(builder: MeshBuilder, bridge: Overpass) -> None:
         builder.box((-reach, y[0], top - 0.4), (reach, y[1], top + PARAPET), Surface.CONCRETE, without="-z")
     for x in np.arange(-half + 9.0, half - 8.0, 18.0) if bridge.span > 60 else (-half + 2.0, half - 2.0):
         for y0 in np.linspace(-side + 1.5, side - 2.5, max(2, int(bridge.width / 7))):
-            builder.box(
-                (x - 0.5, y0, 0), (x + 0.5, y0 + 1.0, top - DEPTH), Surface.CONCRETE, without="-z+z"
-            )
+            builder.box((x - 0.5, y0, 0), (x + 0.5, y0 + 1.0, top - DEPTH), Surface.CONCRETE, without="-z+z")
 
 
 def _embankments(builder: MeshBuilder, bridge: Overpass) -> None:
@@ -151,13 +151,11 @@ def _embankments(builder: MeshBuilder, bridge: Overpass) -> None:
         near, far = end * half, end * (half + RAMP)
         foot = BATTER * top
         for sign in (1, -1):
-            slope = [
-                (near, sign * side, top),
-                (far, sign * side, 0.0),
-                (far, sign * side, -0.0),
-                (near, sign * (side + foot), 0.0),
-            ]
-            builder.polygon([slope[0], slope[1], slope[3]], Surface.GRASS, facing=(0, sign, 1))
+            slope = np.array(
+                [(near, sign * side, top), (far, sign * side, 0.0), (near, sign * (side + foot), 0.0)]
+            )
+            # Repeated so densely, the texture is an even green from afar.
+            builder.polygon(slope, Surface.GRASS, facing=(0, sign, 1), uv=slope[:, :2] / _TURF)
         wall = [(near, -side, 0), (near, side, 0), (near, side, top), (near, -side, top)]
         builder.polygon(wall, Surface.CONCRETE, facing=(-end, 0, 0))
         for sign in (1, -1):
@@ -202,7 +200,7 @@ def _band(
     uv: ArrayLike | None = None,
 ) -> None:
     """Add a strip from ``low`` to ``high`` across that follows the road's height at its stations."""
-    for start, end in zip(stations[:-1], stations[1:], strict=True):
+    for start, end in pairwise(stations):
         z0, z1 = (float(z) + lift for z in bridge.height([start, end]))
         corners = [(start, low, z0), (end, low, z1), (end, high, z1), (start, high, z0)]
         builder.polygon(corners, surface, facing=(0, 0, 1), uv=uv)

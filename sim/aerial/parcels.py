@@ -1,4 +1,4 @@
-"""How the land around the roads is used: plots in rows, each a field, a wood, a garden with a house, a yard."""
+"""How the land around the roads is used: plots in rows, each a field, a wood, a garden, a yard."""
 
 from __future__ import annotations
 
@@ -87,7 +87,9 @@ _STYLES = {
     "suburb": _Style(
         27.0, 30.0, 2, ((Use.GARDEN, 0.72), (Use.MEADOW, 0.12), (Use.WOOD, 0.10), (Use.YARD, 0.06))
     ),
-    "town": _Style(46.0, 36.0, 2, ((Use.YARD, 0.72), (Use.GARDEN, 0.10), (Use.MEADOW, 0.12), (Use.WOOD, 0.06))),
+    "town": _Style(
+        46.0, 36.0, 2, ((Use.YARD, 0.72), (Use.GARDEN, 0.10), (Use.MEADOW, 0.12), (Use.WOOD, 0.06))
+    ),
 }
 STREET = 7.0
 """Metres of asphalt and pavement of a street between the rows."""
@@ -118,7 +120,9 @@ def divide(
         if style.rows and row % style.rows == 0:
             x, y = middle + (place + STREET / 2) * across
             parcels.append(
-                Parcel(Use.STREET, float(x), float(y), heading, 2 * reach, STREET, tuple(rng.random(6).tolist()))
+                Parcel(
+                    Use.STREET, float(x), float(y), heading, 2 * reach, STREET, tuple(rng.random(6).tolist())
+                )
             )
             place += STREET
         s = -reach - rng.uniform(0, style.length)

@@ -118,7 +118,7 @@ class _Canvas:
 
     def blend(self, mask: Mask | Image, colour: ArrayLike | Image) -> None:
         """Lay a colour, (3,) or (H, W, 3), over the picture where a mask says how much."""
-        share = mask.astype(np.float32) / 255 if mask.dtype == np.uint8 else mask
+        share = np.asarray(mask, np.float32) * np.float32(1 / 255 if mask.dtype == np.uint8 else 1)
         rows, columns = np.flatnonzero(share.any(axis=1)), np.flatnonzero(share.any(axis=0))
         if not len(rows):
             return
@@ -130,8 +130,13 @@ class _Canvas:
 
     def shade(self, mask: Mask | Image, change: float) -> None:
         """Lighten, or darken, the picture where a mask says how much."""
-        share = mask.astype(np.float32) / 255 if mask.dtype == np.uint8 else mask
+        share = np.asarray(mask, np.float32) * np.float32(1 / 255 if mask.dtype == np.uint8 else 1)
         self.image += (change * share)[..., None]
+
+
+def _share(mask: Mask, strength: float = 1.0) -> Image:
+    """Turn a mask into the part that what lies beneath gives up."""
+    return mask.astype(np.float32) * np.float32(strength / 255)
 
 
 def _paint_land(canvas: _Canvas, parcels: Sequence[Parcel]) -> None:
@@ -198,10 +203,10 @@ def _paint_details(canvas: _Canvas, parcels: Sequence[Parcel]) -> None:
                 line = [parcel.at(-parcel.length / 2, y), parcel.at(parcel.length / 2, y)]
                 canvas.stroke(kerbs, line, 1.6)
     grain = canvas.noise("fine", 29.0)
-    canvas.blend(np.clip(hedges.astype(np.float32) / 255 * (0.5 + 0.3 * grain), 0, 1), (0.33, 0.36, 0.22))
-    canvas.blend(0.85 * (paths.astype(np.float32) / 255), (0.60, 0.57, 0.53))
-    canvas.blend(0.8 * (kerbs.astype(np.float32) / 255), (0.62, 0.61, 0.59))
-    canvas.blend(0.6 * (bays.astype(np.float32) / 255), _WHITE)
+    canvas.blend(_share(hedges) * np.clip(0.5 + 0.3 * grain, 0, 1), (0.33, 0.36, 0.22))
+    canvas.blend(_share(paths, 0.85), (0.60, 0.57, 0.53))
+    canvas.blend(_share(kerbs, 0.8), (0.62, 0.61, 0.59))
+    canvas.blend(_share(bays, 0.6), _WHITE)
 
 
 def car_rows(parcel: Parcel) -> tuple[float, ...]:

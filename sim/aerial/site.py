@@ -8,13 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.aerial.crossing import BOX, crossing_roads
 from sim.aerial.land import Land
-from sim.aerial.networks import ARM, BOX, Network, Strip, along_road, crossing_roads, lay_road
+from sim.aerial.networks import Network, Strip, along_road, lay_road
 from sim.aerial.overpass import Overpass
 from sim.aerial.parcels import Free, divide
 from sim.aerial.photo import photograph
+from sim.aerial.replay import decks, middle_and_heading, surroundings
 from sim.models import Ground, Model, Photo
 from sim.params import AerialParams, AerialRoadParams
+from sim.recorded import Recording
 from sim.rng import stream
 from sim.roads import PLAIN_DROP, InCarRoad
 from sim.world import Bodies
@@ -22,8 +25,10 @@ from sim.world import Bodies
 Floats = NDArray[np.float64]
 Area = tuple[float, float, float, float]
 
-BEYOND = 190.0
-"""Metres of road before and behind what the camera may look at: vehicles come and go out of its sight."""
+UNSEEN = 70.0
+"""Metres of road beyond what the camera may see: vehicles come and go there."""
+HAIRPIN = 380.0
+"""Metres of a road with a U-turn, without what lies out of sight at its ends."""
 SPACING = 82.0
 """Metres between the bridges over a road."""
 ABUTMENT = 5.0
@@ -43,6 +48,7 @@ class Layout:
         road: The main road, where there is one.
         course: (A, 2) points along which the camera's aim moves, metres apart by `Layout.step`.
         step: Metres between two of them.
+        beyond: Metres of road before and behind the places that the camera aims at.
         start: Metres along the course at which the aim begins.
         across: Heading with which the road runs, radians.
         overpasses: The bridges.
@@ -52,6 +58,7 @@ class Layout:
     road: InCarRoad | None
     course: Floats
     step: float
+    beyond: float
     start: float
     across: float
     overpasses: tuple[Overpass, ...]
@@ -77,23 +84,29 @@ class Site:
     ground: Ground
 
 
-def lay_out(params: AerialParams, seconds: float, seed: int) -> Layout:
+def lay_out(
+    params: AerialParams, seconds: float, seed: int, view: float, recording: Recording | None = None
+) -> Layout:
     """Draw roads and bridges.
 
     Args:
         params: Of the scene.
         seconds: How long the platform flies.
         seed: The episode's.
+        view: Metres from its aim that the camera may see.
+        recording: Traffic whose roads are taken, in place of a network of ours.
     """
     rng = stream(seed, "aerial", "roads")
-    traffic = params.traffic
+    if recording is not None:
+        return _around(params, seconds, recording, view, rng)
+    traffic, beyond = params.traffic, view + UNSEEN
     if params.road.network == "intersection":
-        network = crossing_roads(params.road, traffic)
-        return _with_arms(params.road, network, rng)
+        network = crossing_roads(params.road, traffic, beyond)
+        return _with_arms(params.road, network, beyond, rng)
     flown = abs(params.platform.speed) * seconds
-    reach = 2 * BEYOND + max(flown, (params.road.bridges - 1) * SPACING) + 2 * params.platform.sway
+    reach = 2 * beyond + max(flown, (params.road.bridges - 1) * SPACING) + 2 * params.platform.sway
     if params.road.network == "u-turn":
-        reach = 640.0
+        reach = HAIRPIN + 2 * view
     road = lay_road(params.road, reach, rng)
     network = along_road(road, traffic.density, traffic.oncoming_density)
     step = 2.0
@@ -113,13 +126,34 @@ def lay_out(params: AerialParams, seconds: float, seed: int) -> Layout:
         road=road,
         course=course,
         step=step,
+        beyond=beyond,
         start=start,
         across=float(road.heading(0.5 * road.length)) if params.road.network != "u-turn" else 0.0,
         overpasses=overpasses,
     )
 
 
-def _with_arms(params: AerialRoadParams, network: Network, rng: np.random.Generator) -> Layout:
+def _around(
+    params: AerialParams, seconds: float, recording: Recording, view: float, rng: np.random.Generator
+) -> Layout:
+    """Lay out what is around recorded traffic; the camera looks at the middle of it."""
+    middle, heading = middle_and_heading(recording)
+    ahead = np.array([np.cos(heading), np.sin(heading)])
+    reach = abs(params.platform.speed) * seconds + params.platform.sway + 1.0
+    places = np.arange(-reach, reach + 1.0)
+    return Layout(
+        network=surroundings(recording),
+        road=None,
+        course=middle + places[:, None] * ahead,
+        step=1.0,
+        beyond=view + UNSEEN,
+        start=reach - 0.5 * params.platform.speed * seconds,
+        across=heading,
+        overpasses=decks(params.road, middle, heading, rng),
+    )
+
+
+def _with_arms(params: AerialRoadParams, network: Network, beyond: float, rng: np.random.Generator) -> Layout:
     """Put a viaduct over an arm, or two, of an intersection; the camera sees both it and the lights."""
     overpasses = []
     for k in range(params.bridges):
@@ -131,7 +165,7 @@ def _with_arms(params: AerialRoadParams, network: Network, rng: np.random.Genera
                 x=side * away,
                 y=0.0,
                 heading=np.pi / 2 + float(rng.uniform(-0.12, 0.12)),
-                span=2 * ARM,
+                span=2 * beyond,
                 width=params.bridge_width * float(rng.uniform(0.92, 1.08)),
                 carries="road",
                 ramps=False,
@@ -144,6 +178,7 @@ def _with_arms(params: AerialRoadParams, network: Network, rng: np.random.Genera
         road=None,
         course=course,
         step=1.0,
+        beyond=beyond,
         start=0.0,
         across=0.0,
         overpasses=tuple(overpasses),
@@ -153,7 +188,7 @@ def _with_arms(params: AerialRoadParams, network: Network, rng: np.random.Genera
 def _bridge_over(
     road: InCarRoad, strip: Strip, sites: Sequence[float], width: float, rng: np.random.Generator
 ) -> tuple[Overpass, ...]:
-    """Put bridges across a road near the given places along it; one whose embankments have no room is left out."""
+    """Put bridges across a road near the given places along it; those without room are left out."""
     found: list[Overpass] = []
     for wanted in sites:
         for attempt in range(24):
@@ -213,7 +248,7 @@ def furnish(
         seed: The episode's.
     """
     models = (*catalogue, *(overpass.model() for overpass in layout.overpasses))
-    approaches = tuple(strip for o in layout.overpasses for strip in o.approaches(BEYOND))
+    approaches = tuple(strip for o in layout.overpasses for strip in o.approaches(layout.beyond))
     covered = tuple(overpass.footprint() for overpass in layout.overpasses)
     setting = params.scenery.setting
     rng = stream(seed, "aerial", "parcels")
@@ -239,7 +274,7 @@ def furnish(
 
 def make_ground(photo: Photo) -> Ground:
     """Lay a photo flat, and a plain below it out to where nothing is seen."""
-    west, south = photo.low
+    south = photo.low[1]
     width, depth = photo.extent
     inner = np.array([[0, 0], [width, 0], [width, depth], [0, depth]]) + photo.low
     outer = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * HORIZON + inner

@@ -12,7 +12,7 @@ from sim.aerial.fleet import LookalikeFleet
 from sim.aerial.flows import Flows, Traveller
 from sim.aerial.networks import along_road
 from sim.aerial.overpass import Overpass
-from sim.aerial.site import BEYOND, Layout
+from sim.aerial.site import Layout
 from sim.aerial.waves import Waves
 from sim.fleet import Surge
 from sim.models import Model
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 WARM_UP = 6.0
 """Seconds of traffic before tick 0, in which gaps and lanes settle."""
-LEVEL = 1 << 14
+LEVEL = 1 << 20
 """Numbers that each level has for its vehicles."""
 CONVOY_LEAD = 75.0
 """Metres along its path of the convoy's last vehicle, when the traffic begins."""
@@ -68,7 +68,7 @@ class AerialTraffic:
         for k, overpass in enumerate(layout.overpasses):
             if overpass.carries != "road" or params.bridge_density == 0:
                 continue
-            road = overpass.road(BEYOND if overpass.ramps else 0.0)
+            road = overpass.road(layout.beyond if overpass.ramps else 0.0)
             network = along_road(road, params.bridge_density, params.bridge_density)
             flows = Flows(network, fleet, calm, changes=False, seed=seed, name=f"bridge-{k}", rate=rate)
             flows.fill()
@@ -161,5 +161,3 @@ def _bodies(travellers: Sequence[Traveller], overpass: Overpass | None, first: i
         lamps=np.zeros(count, np.uint8),
         leans=np.zeros((count, 2)),
     )
-
-

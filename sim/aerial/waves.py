@@ -8,7 +8,7 @@ import numpy as np
 
 SPEED = 4.5
 """M/s at which waves run against the traffic."""
-LENGTH = (75.0, 130.0)
+LENGTH = (95.0, 140.0)
 """Metres between two waves, shortest and longest."""
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sim.camera import Camera, Pose
 from sim.render.antialias import smooth_edges
 from sim.render.context import check, context
-from sim.render.ground import MARGIN, cut, grain_texture, ground_texture, mark_table
+from sim.render.ground import MARGIN, cut, grain_texture, ground_texture, mark_table, vertex_layout
 from sim.render.instances import COMMAND, CONTACT, INSTANCE, Library, contacts, in_bands
 from sim.render.lamps import HALO, LIGHTS, Burning, LampPlan, halos, lights
 from sim.render.materials import material_table
@@ -343,15 +343,7 @@ class GlRenderer:
             keep(
                 ctx.vertex_array(
                     shader,
-                    [
-                        (self._ground_vertices, "3f 2f", "in_position", "in_road"),
-                        (self._stretches, "3f 1f/i", "i_offset", "i_arc"),
-                    ]
-                    if "in_road" in shader
-                    else [
-                        (self._ground_vertices, "3f 8x", "in_position"),
-                        (self._stretches, "3f 4x/i", "i_offset"),
-                    ],
+                    vertex_layout(shader, self._ground_vertices, self._stretches),
                     self._ground_faces,
                 )
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +86,13 @@ class Stretches:
         out["base_vertex"] = self.base_vertex[rows]
         out["base_instance"] = np.arange(len(rows))
         return out.ravel()
+
+
+def vertex_layout(shader: Any, vertices: Any, stretches: Any) -> list[tuple[Any, ...]]:
+    """Return what a ground's shader reads of both buffers: one that paints a photo needs no arc lengths."""
+    if "in_road" in shader:
+        return [(vertices, "3f 2f", "in_position", "in_road"), (stretches, "3f 1f/i", "i_offset", "i_arc")]
+    return [(vertices, "3f 8x", "in_position"), (stretches, "3f 4x/i", "i_offset")]
 
 
 def cut(ground: Ground) -> Stretches:

@@ -7,17 +7,19 @@ where that swings to and fro, vehicles leave the picture and come back.
 
 from __future__ import annotations
 
-
 import numpy as np
 from numpy.typing import NDArray
 
 from sim import meshes
 from sim.aerial.platform import Platform
+from sim.aerial.replay import RecordedTraffic
 from sim.aerial.site import Area, furnish, lay_out
 from sim.aerial.traffic import AerialTraffic
 from sim.camera import Camera, Pose
 from sim.light import make_light
+from sim.meshes.motorcycles import rider_models
 from sim.params import AerialParams
+from sim.recorded import read
 from sim.render.types import Stage
 from sim.weather import ChangingLight, Wind
 from sim.world import Aloft, WorldState
@@ -47,6 +49,9 @@ class AerialScene:
             seed: Picks one layout, traffic, flight and light among all that the parameters allow.
             rate: Ticks a second.
             seconds: How long the platform may fly.
+
+        Raises:
+            RecordingError: If there is to be recorded traffic, and the recording is missing or too short.
         """
         self._params, self.rate, self._tick = params, rate, -1
         mount = params.camera
@@ -59,10 +64,26 @@ class AerialScene:
             near=NEAR * params.platform.altitude,
             far=SPAN * params.platform.altitude,
         )
-        self._layout = lay_out(params, seconds, seed)
+        models = meshes.catalogue()
+        recording = read(params.recording.path) if params.recording.path else None
+        if recording is not None:
+            models += rider_models()
+        self._layout = lay_out(params, seconds, seed, view_reach(self.camera, params), recording)
         self._platform = Platform(params.platform, mount, across=self._layout.across + np.pi / 2, seed=seed)
-        site = furnish(params, self._layout, self._area(seconds), meshes.catalogue(), seed)
-        self._traffic = AerialTraffic(params.traffic, self._layout, site.models, seed=seed, rate=rate)
+        site = furnish(params, self._layout, self._area(seconds), models, seed)
+        self._traffic: AerialTraffic | RecordedTraffic
+        if recording is None:
+            self._traffic = AerialTraffic(params.traffic, self._layout, site.models, seed=seed, rate=rate)
+        else:
+            self._traffic = RecordedTraffic(
+                recording,
+                params.traffic,
+                site.models,
+                start=params.recording.start,
+                seconds=seconds,
+                seed=seed,
+                rate=rate,
+            )
         self.stage = Stage(
             models=site.models,
             scenery=site.scenery,
@@ -142,5 +163,3 @@ def view_reach(camera: Camera, params: AerialParams) -> float:
     ground = pose.position[:2] - rays[:, :2] * (height / rays[:, 2:])
     aim = np.array([height * np.tan(tilt), 0.0])
     return float(np.hypot(*(ground - aim).T).max()) + 6.0
-
-

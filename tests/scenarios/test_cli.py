@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios import cli
+from scenarios import cli, manifest, spec
 from tests.scenarios.clips import cut, write_clip
 
 HEAVY = (
@@ -66,6 +66,31 @@ BAD = {
         "--out",
         "{tmp}/text.mp4",
     ),
+    "jobs and cluster": ("run", "in-car-day", "--jobs", "2", "--cluster", "tcp://127.0.0.1:1"),
+    "no such cluster": (
+        *("run", "lane-day", "--tracker", "tests.scenarios.fakes:SilentTracker"),
+        *("--cluster", "no address"),
+    ),
+    "nowhere to generate": ("generate", "in-car-day"),
+    "generate an unknown scenario": ("generate", "in-car-dya", "--out", "{out}"),
+    "generate a misspelt key": ("generate", "in-car-day", "--set", "sensor.nois=3", "--out", "{out}"),
+    "unknown format": ("generate", "in-car-day", "--format", "voc", "--out", "{out}"),
+    "unknown coding": ("generate", "in-car-day", "--frames", "gif", "--out", "{out}"),
+    "none to generate": ("generate", "in-car-day", "--count", "0", "--out", "{out}"),
+    "generate a negative seed": ("generate", "in-car-day", "--seed", "-1", "--out", "{out}"),
+    "generate without jobs": ("generate", "in-car-day", "--jobs", "0", "--out", "{out}"),
+    "generate on no cluster": ("generate", "in-car-day", "--cluster", "no address", "--out", "{out}"),
+    "generate into a file": ("generate", "in-car-day", "--out", "{tmp}/text.mp4"),
+    "generate among other files": ("generate", "in-car-day", "--out", "{tmp}"),
+    "no manifest": ("replay",),
+    "missing manifest": ("replay", "{tmp}/none.json"),
+    "a folder as manifest": ("replay", "{tmp}"),
+    "text as manifest": ("replay", "{tmp}/text.mp4"),
+    "other JSON as manifest": ("replay", "{tmp}/other.json"),
+    "manifest without a scenario": ("replay", "{tmp}/empty.json"),
+    "manifest with a wrong parameter": ("replay", "{tmp}/wrong.json"),
+    "manifest without episodes": ("replay", "{tmp}/cut.json"),
+    "manifest of an unknown tracker": ("replay", "{tmp}/tracker.json"),
     "missing video": ("track", "{tmp}/none.mp4", "--method", "in-car"),
     "text as video": ("track", "{tmp}/text.mp4", "--method", "in-car"),
     "truncated video": ("track", "{tmp}/cut-0.5-clip.mp4", "--method", "tests.scenarios.fakes:SilentTracker"),
@@ -90,6 +115,19 @@ def inputs(tmp_path_factory):
     (folder / "nan.toml").write_text('scene = "in-car"\n[sensor]\nnoise = nan\n')
     (folder / "negative.toml").write_text('scene = "in-car"\n[camera]\nwidth = -640\n')
     (folder / "text.mp4").write_text("not a video\n" * 50)
+    scenario = spec.load("in-car-day").model_dump(mode="json")
+    whole = {"format": manifest.FORMAT, "scenario": scenario, "trackers": [], "odometry": False}
+    whole |= {"environment": {}, "episodes": []}
+    wrong = scenario | {"params": scenario["params"] | {"sensor": {"noise": -1}}}
+    documents = {
+        "other": {"a": 1},
+        "empty": {"format": manifest.FORMAT},
+        "wrong": whole | {"scenario": wrong},
+        "cut": {key: value for key, value in whole.items() if key != "episodes"},
+        "tracker": whole | {"trackers": ["none:such"]},
+    }
+    for name, document in documents.items():
+        (folder / f"{name}.json").write_text(json.dumps(document))
     cut(write_clip(folder / "clip.mp4", 30), 0.5)
     cut(write_clip(folder / "fast.mp4", 60, movflags="faststart"), 0.8)
     write_clip(folder / "none.avi", 0)
@@ -102,7 +140,7 @@ def test_bad_input_ends_with_2_and_one_line_and_leaves_nothing(
 ):
     monkeypatch.chdir(tmp_path)
     before = sorted(inputs.iterdir())
-    arguments = [argument.format(tmp=inputs) for argument in arguments]
+    arguments = [argument.format(tmp=inputs, out=tmp_path / "out") for argument in arguments]
     if arguments and arguments[0] in ("run", "track") and "--out" not in arguments:
         arguments += ["--out", str(tmp_path / "out")]
     code, out, err = call(*arguments, capsys=capsys)
@@ -131,6 +169,9 @@ def test_a_misspelt_key_names_the_nearest_the_file_and_the_key(inputs, capsys):
         ["run", "--sed"],
         ["run", "in-car-dya"],
         ["run", "in-car-day", "--jobs", "0"],
+        ["generate", "--help"],
+        ["generate", "in-car-day", "--out", "none", "--count", "0"],
+        ["replay", "--help"],
     ],
 )
 def test_help_and_errors_import_nothing_heavy(arguments):
@@ -146,7 +187,7 @@ def test_help_and_errors_import_nothing_heavy(arguments):
 def test_help_names_the_commands(capsys):
     code, out, _ = call("--help", capsys=capsys)
     assert code == 0
-    for command in ("list", "run", "track", "doctor"):
+    for command in ("list", "run", "track", "generate", "replay", "doctor"):
         assert command in out
 
 

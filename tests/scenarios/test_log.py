@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.log import EpisodeLog, TraceLog, load, save
 from scenarios.shown import ShownLog
-from sim.truth.types import FrameTruth
+from sim.truth.types import AerialTruth, FrameTruth
 from tracker.types import Tracks
 
 
@@ -116,6 +116,27 @@ def test_loading_gives_what_was_saved(tmp_path: Path, frames: int, with_traces: 
     assert same(load(tmp_path / "log.npz"), log)
     assert not same(load(tmp_path / "log.npz"), replace(log, seed=1))
     assert [p.name for p in tmp_path.iterdir()] == ["log.npz"]
+
+
+def test_the_truth_from_the_air_is_kept(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    log = make_log()
+    aloft = tuple(
+        AerialTruth(
+            **{f.name: getattr(frame, f.name) for f in fields(frame)},
+            world_positions=rng.random((len(frame), 3)),
+            world_velocities=rng.random((len(frame), 3)),
+            sizes=rng.random((len(frame), 3)),
+            colours=rng.random((len(frame), 3)).astype(np.float32),
+            ground_to_image=rng.random((3, 3)),
+        )
+        for frame in log.truth
+    )
+    log = replace(log, scene="aerial", truth=aloft)
+    save(log, tmp_path / "log.npz")
+    loaded = load(tmp_path / "log.npz")
+    assert all(isinstance(frame, AerialTruth) for frame in loaded.truth)
+    assert same(loaded, log)
 
 
 def test_depths_are_kept(tmp_path: Path) -> None:

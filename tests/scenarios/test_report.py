@@ -13,8 +13,8 @@ import pytest
 from scenarios.report.annotate import STRIP, annotate
 from scenarios.report.film import Film
 from scenarios.report.history import MAX_ROWS, History, ProfileRows, Thinned
-from scenarios.report.page import Picture
 from scenarios.report.palette import LABELS, identity, rgb
+from scenarios.report.pictures import Picture
 from scenarios.report.recorder import Recorder
 from scenarios.report.tables import flat, number
 from tests.scenarios import report_episode as episode

@@ -12,6 +12,7 @@ import pytest
 from scenarios import runs, spec
 from scenarios.log import load
 from scenarios.runs import Run
+from scenarios.workers import LocalPool
 from sim.render.context import RenderUnavailableError, context
 
 SILENT = "tests.scenarios.fakes:SilentTracker"
@@ -82,8 +83,8 @@ def test_seeds_and_settings_change_what_they_should():
 def test_results_do_not_depend_on_the_jobs():
     scenario = spec.load("in-car-day", ["seconds=0.1"])
     options = {"scenario": scenario, "seeds": range(2), "trackers": (SILENT, MIDDLE)}
-    one = runs.execute(Run(**options, jobs=1))
-    two = runs.execute(Run(**options, jobs=2))
+    one = runs.execute(Run(**options))
+    two = runs.execute(Run(**options), workers=LocalPool(2))
     assert one["paired"] == two["paired"]
     for a, b in zip(one["runs"], two["runs"], strict=True):
         assert a["tracker"] == b["tracker"]
@@ -95,7 +96,7 @@ def test_results_do_not_depend_on_the_jobs():
 
 def test_an_episode_is_kept_whole(tmp_path):
     run = Run(scenario=spec.load("in-car-day", ["seconds=0.1"]), seeds=range(3, 5), trackers=(SILENT, MIDDLE))
-    documents = runs.run_seed(run, 4, tmp_path)
+    documents = runs.run_seed(run, tmp_path, 4)
     folder = tmp_path / "seed-4" / "tests.scenarios.test_cli-MiddleTracker"
     assert {entry.name for entry in folder.iterdir()} == {
         "scores.json",

@@ -8,6 +8,7 @@ from scenarios.spec import SpecError
 NAMES = ("in-car-curve", "in-car-day", "in-car-night", "in-car-rain", "in-car-stop-and-go", "in-car-urban")
 
 
+AERIAL = ("aerial-bridge", "aerial-bridges", "aerial-convoy", "aerial-intersection", "aerial-winding")
 LANES = ("lane-cloudy", "lane-day", "lane-dense", "lane-flash", "lane-parked", "lane-wrong-way")
 
 
@@ -15,13 +16,24 @@ def test_the_library_holds_the_scenarios_of_the_lane():
     for name in LANES:
         scenario = spec.load(name)
         camera = scenario.params.camera
-        assert (scenario.scene, scenario.frames, scenario.rate) == ("motorcycle-lane", 330, 30)
+        frames = 780 if name == "lane-parked" else 330
+        assert (scenario.scene, scenario.frames, scenario.rate) == ("motorcycle-lane", frames, 30)
         assert (camera.width, camera.height) == (360, 240)
         assert scenario.description
 
 
+def test_the_library_holds_the_five_scenarios_from_the_air():
+    for name in AERIAL:
+        scenario = spec.load(name)
+        camera = scenario.params.camera
+        assert (scenario.scene, scenario.frames, scenario.rate) == ("aerial", 600, 30)
+        assert (camera.width, camera.height) == (640, 480)
+        assert 120 <= scenario.params.platform.altitude <= 300
+        assert scenario.description
+
+
 def test_the_library_holds_the_six_in_car_scenarios_of_twenty_seconds():
-    assert tuple(spec.library()) == NAMES + LANES
+    assert tuple(spec.library()) == AERIAL + NAMES + LANES
     for name in NAMES:
         scenario = spec.load(name)
         camera = scenario.params.camera

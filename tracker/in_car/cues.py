@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.in_car.body import BODY_PLAY, BODY_SHARE
 from tracker.in_car.outlines import FRAME_SIDE, REAR, foot, rear_edges, rear_width, roof, side
 from tracker.in_car.relief import ACROSS, BRIGHT, DOWN, RED, Relief, mean
 
@@ -98,8 +99,6 @@ class Cue(IntEnum):
 
 # Points' log odds count up to this much; beyond CLEAR a point is called for or against.
 MOST, CLEAR = 4.0, 0.8
-# How far the points of one body may move apart over the remembered time: px, and as a share of its width.
-BODY_PLAY, BODY_SHARE = 1.0, 0.02
 # How far around an outline its cut-off parts are looked for: less than the gap between two lanes.
 REACH = 0.3
 COUNT = len(Cue)

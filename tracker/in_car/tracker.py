@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from tracker.in_car.evidence import motion_evidence
 from tracker.in_car.features import stiffness, working_picture
 from tracker.in_car.front_end import FrontEnd
+from tracker.in_car.outline_odds import Trees, learnt_trees
 from tracker.in_car.points import PointStore
 from tracker.in_car.traces import TraceSet
 from tracker.in_car.vehicles import CORRELATION, Sighting, VehicleStore
@@ -43,8 +44,13 @@ RIPE = 4
 class InCarTracker:
     """Finds and tracks the vehicles that go the ego's way."""
 
-    def __init__(self) -> None:
-        """Build the tracker; `start` begins an episode."""
+    def __init__(self, trees: Trees | None = None) -> None:
+        """Build the tracker; `start` begins an episode.
+
+        Args:
+            trees: By which outlines are weighed; those that come with the tracker if None.
+        """
+        self._trees = trees if trees is not None else learnt_trees()
         self._diagnostics = Diagnostics()
 
     def start(self, info: Info) -> None:
@@ -52,7 +58,7 @@ class InCarTracker:
         self._info = info
         self._front = FrontEnd(info)
         self._points = PointStore(memory=max(5, round(CORRELATION * info.rate)) + 1)
-        self._vehicles = VehicleStore(rate=info.rate)
+        self._vehicles = VehicleStore(rate=info.rate, trees=self._trees)
         self._ego: EgoMotion | None = None
         self._odds: dict[int, float] = {}
         self._diagnostics = Diagnostics()

@@ -11,9 +11,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.in_car.cues import BODY_PLAY, BODY_SHARE, cues
+from tracker.in_car.body import body_motion
+from tracker.in_car.cues import cues
 from tracker.in_car.features import Picture
-from tracker.in_car.outline_odds import log_odds
+from tracker.in_car.outline_odds import Trees, log_odds
 from tracker.in_car.outlines import outlines
 from tracker.in_car.points import PointStore
 from tracker.in_car.relief import RED, Relief, make_relief
@@ -29,6 +30,8 @@ LOWEST, HIGHEST = -6.0, 5.0
 # Log odds of a single outline: at which a vehicle is begun; which neither raise nor lower a vehicle's; and
 # what one look may add or take.
 BEGIN, EVEN, MOST = 0.5, -1.0, 4.0
+# Seconds before a vehicle is judged by how it moves.
+YOUNG = 0.2
 # Outlines are looked at once in so many frames.
 SEARCH = 3
 # Play of an outline's sides and foot around where they are expected, as a share of the width, and of the
@@ -45,6 +48,9 @@ LIKELY, UNCLEAR = 1.0, -0.5
 # Difference in redness, grey levels, between so many px around a point and so much wider surroundings, from
 # which on it may be on a tail lamp. Its vehicle may stand while the ego moves, and so move like the scenery.
 LAMP_RED, LAMP_REACH, AROUND = 25.0, 2, 10
+# Most growth, as a share of the size a frame, of a vehicle that was only ever seen cut off by the frame. It
+# overtakes, since one that is overtaken was seen whole before; scenery that the ego passes grows.
+PASSING_GROWTH = 0.003
 # Ego speed below which a look tells less and less that the last one did not, m/s.
 WALK = 5.0
 
@@ -64,6 +70,7 @@ class Vehicle:
         missed: Frames since a point or an outline showed it.
         members: Points that move with it.
         confirmed: Whether it ever was sure.
+        whole: Whether the frame ever showed both its sides.
         rivals: Looks in a row at which another outline was better.
     """
 
@@ -77,6 +84,7 @@ class Vehicle:
     missed: int = 0
     members: int = 0
     confirmed: bool = False
+    whole: bool = False
     rivals: int = 0
 
     @property
@@ -110,9 +118,15 @@ class VehicleStore:
         sighting: What was seen in this frame; None where it was not looked for.
     """
 
-    def __init__(self, *, rate: float) -> None:
-        """Start without vehicles."""
+    def __init__(self, *, rate: float, trees: Trees) -> None:
+        """Start without vehicles.
+
+        Args:
+            rate: Frames a second.
+            trees: By which outlines are weighed.
+        """
         self._rate = rate
+        self._trees = trees
         self._next_id = 1
         self._frame = 0
         self.vehicles: list[Vehicle] = []
@@ -159,7 +173,7 @@ class VehicleStore:
             return
         seen = points.position[ripe], moved[ripe], points.evidence[ripe]
         measured, windows = cues(relief, found, *seen)
-        odds = log_odds(measured)
+        odds = log_odds(measured, self._trees)
         self.sighting = Sighting(boxes=windows, cues=measured, odds=odds)
         # Of the two roofs the likelier.
         count = len(found)
@@ -202,7 +216,8 @@ class VehicleStore:
             # While the ego stands nothing moves that could show it.
             gain *= min(1.0, speed / WALK)
         vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
-        if vehicle.odds > CONFIRM and vehicle.age >= 0.2 * self._rate and vehicle.members >= 2:
+        vehicle.whole = vehicle.whole or not cut
+        if vehicle.odds > CONFIRM and vehicle.age >= YOUNG * self._rate and vehicle.members >= 2:
             vehicle.confirmed = True
         if odds[best] > 0.0:
             vehicle.missed = 0
@@ -242,39 +257,32 @@ class VehicleStore:
         """Move the box with its points."""
         own = np.flatnonzero((points.owner == vehicle.id) & (points.age >= 1))
         box = vehicle.box
+        middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])])
         vehicle.age += 1
-        if len(own) >= 1:
-            flow = points.flow[own]
-            shift = np.median(flow, axis=0)
-            away = points.position[own] - np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])]) - shift
-            expected = shift + vehicle.growth * away
-            off = np.abs(flow - expected).max(1)
-            wide = box[2] - box[0]
-            bad = off > 1.0 + 0.02 * wide
-            if len(own) >= 3:
-                # Over a longer time bodies come apart that a frame does not tell apart.
-                long = moved[own] - vehicle.growth * self._rate * CORRELATION * away
-                off = np.abs(long - np.median(long, axis=0)).max(1)
-                bad |= (points.age[own] >= 4) & (off > 2.0 * BODY_PLAY + 2.0 * BODY_SHARE * wide)
-            points.owner[own[bad]] = 0
-            own, flow, away = own[~bad], flow[~bad], away[~bad]
-        vehicle.members = len(own)
-        if len(own) >= 1:
-            shift = np.median(flow, axis=0)
-            if len(own) >= 3:
-                centred = away - away.mean(0)
-                power = float((centred * centred).sum())
-                scale = float((centred * (flow - flow.mean(0))).sum()) / max(power, 30.0)
-                trust = power / (power + 2000.0)
-                vehicle.growth += 0.3 * trust * (float(np.clip(scale, -0.05, 0.05)) - vehicle.growth)
-            middle_shift = shift - vehicle.growth * np.median(away, axis=0)
+        vehicle.members = 0
+        if len(own):
+            kept, shift, away, growth, trust = body_motion(
+                points.position[own],
+                points.flow[own],
+                moved[own],
+                points.age[own] >= 4,
+                middle,
+                box[2] - box[0],
+                vehicle.growth,
+                self._rate * CORRELATION,
+            )
+            points.owner[own[~kept]] = 0
+            vehicle.members = int(kept.sum())
+        if vehicle.members:
+            vehicle.growth += 0.3 * trust * (growth - vehicle.growth)
+            middle_shift = shift - vehicle.growth * away
             vehicle.velocity += 0.3 * (middle_shift - vehicle.velocity)
             vehicle.missed = 0
         else:
             middle_shift = vehicle.velocity
             vehicle.growth *= 0.95
             vehicle.missed += 1
-        middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])]) + middle_shift
+        middle += middle_shift
         half = 0.5 * np.array([box[2] - box[0], box[3] - box[1]]) * (1.0 + vehicle.growth)
         vehicle.box = np.concatenate([middle - half, middle + half])
 
@@ -289,12 +297,14 @@ class VehicleStore:
             seen = max(min(box[2], width) - max(box[0], 0.0), 0.0) * max(
                 min(box[3], height) - max(box[1], 0.0), 0.0
             )
+            old = vehicle.age >= YOUNG * self._rate
             gone = (
                 vehicle.odds < REJECT
                 or vehicle.missed > (patience if vehicle.confirmed else 3)
                 or seen < 0.25 * wide * tall
                 or tall < 6.0
                 or box[3] < horizon + 4.0
+                or (not vehicle.whole and old and vehicle.growth > PASSING_GROWTH)
                 or (not vehicle.confirmed and vehicle.age > 2.0 * self._rate and vehicle.odds < 0.5)
                 or any(covered(box, other.box) > SAME for other in kept)
             )

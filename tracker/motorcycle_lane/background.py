@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -69,6 +70,9 @@ class BackgroundParameters:
         uncovered: Whether a pixel that moved and now equals the background image is background, whatever its
             pair of colours. As printed the pair decides, and the strip that an object has just uncovered is
             foreground.
+        rims: Whether what is changed beside foreground is learnt as foreground, too, though it looks like
+            background. As printed, every pixel of an object that does is written into the background image
+            and into the tables as background, and the next object is the less seen there.
     """
 
     mode: StatMode = StatMode.CONDITIONAL
@@ -89,6 +93,7 @@ class BackgroundParameters:
     flash_frames: int = 3
     follow_light: bool = True
     uncovered: bool = True
+    rims: bool = True
 
     def __post_init__(self) -> None:
         for name in ("colours", "gradients", "pairs"):
@@ -104,6 +109,7 @@ PAPER = BackgroundParameters(
     least_change=10,
     follow_light=False,
     uncovered=False,
+    rims=False,
 )
 """As printed, with OpenCV's values where the paper's are lost."""
 
@@ -200,7 +206,9 @@ class BackgroundModel:
         is_moved = moved > corner(moved_counts, p.least_change, p.most_change)
         changed = is_far if p.uncovered else is_far | is_moved
         background = self._classify(features, changed, is_moved)
-        foreground = ~background
+        found = ~background
+        foreground = self._with_rims(found, changed) if p.rims else found
+        background = ~foreground
         light = keep(self._background, pixels, background, changed, p.image_rate)
         if p.follow_light:
             carry(self._background, foreground, light)
@@ -225,7 +233,13 @@ class BackgroundModel:
         if not self.training:
             self._turn_once_off(np.flatnonzero(foreground))
         self._take_in()
-        return foreground
+        return found
+
+    def _with_rims(self, foreground: NDArray[np.bool_], changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return (P,) foreground and what is changed beside more than specks of it."""
+        picture = foreground.reshape(self._shape).view(np.uint8)
+        near = cv2.dilate(cv2.medianBlur(picture, 3), np.ones((3, 3), np.uint8))
+        return np.asarray(foreground | (changed & near.reshape(-1).view(np.bool_)))
 
     def _classify(
         self, features: Features, changed: NDArray[np.bool_], moved: NDArray[np.bool_]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def clean(mask: NDArray[np.bool_], *, window: int = 5, largest_hole: int = 400) -> NDArray[np.bool_]:
+def clean(mask: NDArray[np.bool_], *, window: int = 3, largest_hole: int = 400) -> NDArray[np.bool_]:
     """Remove specks and fill holes; the same for every background model that is compared.
 
     Args:

@@ -30,5 +30,5 @@ class Sight:
 
 def look(image: NDArray[np.uint8], raw: NDArray[np.bool_]) -> Sight:
     """Clean the raw foreground (H, W) of a picture (H, W, 3) and find its regions."""
-    mask = clean(raw, window=3)
+    mask = clean(raw)
     return Sight(image=image, mask=mask, blobs=find_blobs(mask, max(15, round(LEAST_AREA * mask.size))))

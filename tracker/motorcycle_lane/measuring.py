@@ -24,18 +24,24 @@ Flags = NDArray[np.bool_]
 
 TOO_LARGE = 1.4
 """A region so many times as wide or as high as a rider holds more than one, or one and something else."""
-TOO_SMALL = 0.06
+TOO_SMALL = 0.25
 """A region of a smaller share of a rider's box, not at the border, is no rider."""
 LEAST_WORTH = 0.45
 """How well a silhouette that no track expects must explain foreground."""
 LEAST_SEEN = 0.25
 """Smallest share of a silhouette that must be seen to measure where it is."""
 MOST_ADDED = 4
-CORE = 0.25
-"""Least share of a box that a row or column of a region's core fills."""
+CORE, FEET = 0.12, 0.3
+"""Least share of a box that a row or column of a region's core fills; lowest share, where shadows lie."""
+EATEN = 0.75
+"""What the median filter takes off each end of a rider, px."""
+TRAINING = 30
+"""Frames in which the background is not yet known, nor then what is a rider."""
 LIMIT = 1.5
 """Log likelihood ratios of a pixel's colour lie between this and its negative."""
 SWEEPS = 2
+ROUNDS = 2
+"""Of guessing a rider's size by its row, and the row of its middle, beyond the border, by its size."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +109,8 @@ def count_inside(labels, boxes, regions):  # type: ignore[no-untyped-def]
 def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
     """Return the boxes (N, 4) of labelled regions without what sticks out: rests of shadows, and specks.
 
-    A column belongs to the core if it holds `CORE` of the box's height or more, and a row likewise.
+    A column belongs to the core if it holds `CORE` of the box's height or more above the feet: a shadow lies
+    on the road, so that beside a rider it is low. A row belongs to it if it holds as much of those columns.
 
     Args:
         labels: (H, W) int32, region k has k + 1.
@@ -113,16 +120,44 @@ def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
     for k in range(boxes.shape[0]):
         x0, y0, x1, y1 = int(boxes[k, 0]), int(boxes[k, 1]), int(boxes[k, 2]), int(boxes[k, 3])
         columns, rows = np.zeros(x1 - x0), np.zeros(y1 - y0)
-        for y in range(y0, y1):
+        for y in range(y0, int(np.ceil(y1 - FEET * (y1 - y0)))):
             for x in range(x0, x1):
                 if labels[y, x] == k + 1:
                     columns[x - x0] += 1.0
+        wide = np.flatnonzero(columns >= CORE * (y1 - y0))
+        if not wide.size:
+            continue
+        left, right = x0 + wide[0], x0 + wide[-1] + 1
+        for y in range(y0, y1):
+            for x in range(left, right):
+                if labels[y, x] == k + 1:
                     rows[y - y0] += 1.0
-        wide, tall = np.flatnonzero(columns >= CORE * (y1 - y0)), np.flatnonzero(rows >= CORE * (x1 - x0))
-        if wide.size and tall.size:
-            found[k, 0], found[k, 2] = x0 + wide[0], x0 + wide[-1] + 1
-            found[k, 1], found[k, 3] = y0 + tall[0], y0 + tall[-1] + 1
+        tall = np.flatnonzero(rows >= CORE * (right - left))
+        if not tall.size:
+            continue
+        found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, y0 + tall[0], right, y0 + tall[-1] + 1
     return found
+
+
+def complete(visible: Floats, touches: Flags, sizes: Floats) -> Floats:
+    """Return the whole boxes (N, 4) of riders that the picture's border cuts off.
+
+    Args:
+        visible: (N, 4) what is seen of them.
+        touches: (N, 4) whether that touches the left, upper, right and lower border.
+        sizes: (N, 2) how large they are.
+    """
+    whole = visible.copy()
+    for axis in range(2):
+        low, high = touches[:, axis], touches[:, axis + 2]
+        size = sizes[:, axis]
+        # One that is cut off across may show too little of its breadth; it goes to both sides.
+        across = touches[:, 1 - axis] | touches[:, 3 - axis]
+        lacking = np.maximum(size - (visible[:, axis + 2] - visible[:, axis]), 0.0)
+        both = np.where((low == high) & across, 0.5, 0.0)
+        whole[:, axis] -= lacking * np.where(low & ~high, 1.0, both)
+        whole[:, axis + 2] += lacking * np.where(high & ~low, 1.0, both)
+    return whole
 
 
 class Measurer:
@@ -132,6 +167,7 @@ class Measurer:
         self.sizes = SizeModel(width, height)
         self.silhouette = Silhouette()
         self._frame = np.array([width, height], float)
+        self._frames = 0
 
     def measure(self, sight: Sight, expected: Expected) -> Measurements:
         """Return what is seen, given what is expected."""
@@ -143,7 +179,8 @@ class Measurer:
         linked = inside >= 0.2 * (expected.sizes.prod(1))[:, None]
         linked |= (inside >= 0.5 * blobs.areas) & (blobs.areas > 0)
         of_track, of_blob = components(linked)
-        at_border = np.asarray((blobs.boxes[:, :2] <= 0).any(1) | (blobs.boxes[:, 2:] >= self._frame).any(1))
+        touches = np.concatenate([blobs.boxes[:, :2] <= 0, blobs.boxes[:, 2:] >= self._frame], 1)
+        at_border = np.asarray(touches.any(1))
         # Tracks of a group, and its regions; regions that nobody expects are groups of their own.
         groups = [
             (np.flatnonzero(of_track == k), np.flatnonzero(of_blob == k))
@@ -151,10 +188,12 @@ class Measurer:
         ]
         groups += [(np.zeros(0, np.int64), np.array([b])) for b in np.flatnonzero(of_blob < 0)]
         cores = core_boxes(blobs.labels, blobs.boxes)
-        shown = cores[:, 2:] - cores[:, :2]
-        middles = 0.5 * (cores[:, :2] + cores[:, 2:])
-        known = self.sizes.known(middles[:, 1])
-        usual = self.sizes.sizes(middles[:, 1])
+        visible = cores + EATEN * np.array([-1.0, -1.0, 1.0, 1.0])
+        known = self.sizes.known(0.5 * (cores[:, 1] + cores[:, 3]))
+        whole = visible
+        for _ in range(ROUNDS):
+            usual = self.sizes.sizes(0.5 * (whole[:, 1] + whole[:, 3]))
+            whole = complete(visible, touches & known[:, None], usual)
         numbers = np.zeros(len(blobs) + 1, np.int32)
         joined = np.zeros(len(expected.centres), np.bool_)
         alone: list[int] = []
@@ -169,9 +208,11 @@ class Measurer:
                 continue
             if len(tracks) < 2 and len(regions) == 1:
                 size = expected.sizes[tracks[0]] if len(tracks) else usual[b]
-                part = len(tracks) > 0 or at_border[b]
-                fits = (shown[b] <= TOO_LARGE * size).all()
-                fits &= not part or (shown[b] >= size / TOO_LARGE).all()
+                if len(tracks) and at_border[b]:
+                    whole[b] = complete(visible[b : b + 1], touches[b : b + 1], size[None])[0]
+                shown = whole[b, 2:] - whole[b, :2]
+                fits = (shown <= TOO_LARGE * size).all()
+                fits &= len(tracks) == 0 or (shown >= size / TOO_LARGE).all()
                 if fits or not known[b]:
                     alone.append(b)
                     continue
@@ -181,11 +222,11 @@ class Measurer:
         chosen = np.array(alone, np.int64)
         found = [
             Measurements(
-                centres=middles[chosen],
-                sizes=shown[chosen],
+                centres=0.5 * (whole[chosen, :2] + whole[chosen, 2:]),
+                sizes=whole[chosen, 2:] - whole[chosen, :2],
                 histograms=colour.histograms(bins, blobs.labels, chosen + 1, blobs.boxes[chosen]),
-                alone=np.ones(len(chosen), np.bool_),
-                sized=known[chosen],
+                alone=~at_border[chosen],
+                sized=known[chosen] & ~at_border[chosen],
                 shares=np.ones(len(chosen)),
                 joined=joined,
             )
@@ -195,7 +236,9 @@ class Measurer:
             x0, y0 = blobs.boxes[regions, :2].min(0)
             x1, y1 = blobs.boxes[regions, 2:].max(0)
             found.append(self._explain(owner, number + 1, bins, (x0, y0, x1, y1), expected, tracks, joined))
-        self._learn(blobs.labels, cores, np.array(samples, np.int64), chosen)
+        if self._frames >= TRAINING:
+            self._learn(blobs.labels, cores, np.array(samples, np.int64), chosen)
+        self._frames += 1
         return _together(found, joined)
 
     def _explain(
@@ -261,7 +304,7 @@ class Measurer:
         if not len(samples):
             return
         boxes = cores[samples]
-        self.sizes.learn(0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 2:] - boxes[:, :2])
+        self.sizes.learn(0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 2:] - boxes[:, :2] + 2.0 * EATEN)
         for b in np.intersect1d(samples, alone):
             x0, y0, x1, y1 = cores[b].astype(int)
             self.silhouette.learn(labels[y0:y1, x0:x1] == b + 1)

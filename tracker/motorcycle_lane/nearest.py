@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.filtering.assignment import assign
+from tracker.motorcycle_lane.episode import EpisodeTracker
 from tracker.motorcycle_lane.front_end import look
-from tracker.types import Diagnostics, Frame, Info, Status, Tracks
+from tracker.types import Diagnostics, Frame, Status, Tracks
 
 Floats = NDArray[np.float64]
 
@@ -40,25 +41,13 @@ class NearestTrack:
     misses: int = 0
 
 
-class NearestTracker:
+class NearestTracker(EpisodeTracker):
     """MOG2, nearest neighbours, constant velocity."""
 
-    def __init__(self) -> None:
-        """Build the tracker; `start` begins an episode."""
-        self._diagnostics = Diagnostics()
-
-    def start(self, info: Info) -> None:
-        """Forget everything and get ready for an episode."""
-        self._info = info
+    def _begin(self) -> None:
         self._background = cv2.createBackgroundSubtractorMOG2()
         self._tracks: list[NearestTrack] = []
         self._ids = itertools.count(1)
-        self._diagnostics = Diagnostics()
-
-    @property
-    def diagnostics(self) -> Diagnostics:
-        """Mask and regions of the last frame."""
-        return self._diagnostics
 
     def step(self, frame: Frame) -> Tracks:
         """Return the tracks of this frame; what was returned is final."""

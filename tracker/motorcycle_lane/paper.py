@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from tracker.filtering import jpda, planar
 from tracker.motorcycle_lane import colour
 from tracker.motorcycle_lane.background import PAPER, BackgroundModel
+from tracker.motorcycle_lane.episode import EpisodeTracker
 from tracker.motorcycle_lane.front_end import look
-from tracker.types import Diagnostics, Frame, Info, Status, Tracks
+from tracker.types import Diagnostics, Frame, Status, Tracks
 
 Floats = NDArray[np.float64]
 
@@ -53,25 +54,13 @@ class PaperTrack:
     new: bool = True
 
 
-class PaperTracker:
+class PaperTracker(EpisodeTracker):
     """Follows what moves before a static camera by the printed rules."""
 
-    def __init__(self) -> None:
-        """Build the tracker; `start` begins an episode."""
-        self._diagnostics = Diagnostics()
-
-    def start(self, info: Info) -> None:
-        """Forget everything and get ready for an episode."""
-        self._info = info
-        self._background = BackgroundModel(info.width, info.height, PAPER)
+    def _begin(self) -> None:
+        self._background = BackgroundModel(self._info.width, self._info.height, PAPER)
         self._tracks: list[PaperTrack] = []
         self._ids = itertools.count(1)
-        self._diagnostics = Diagnostics()
-
-    @property
-    def diagnostics(self) -> Diagnostics:
-        """Mask and regions of the last frame."""
-        return self._diagnostics
 
     def step(self, frame: Frame) -> Tracks:
         """Return the tracks of this frame; what was returned is final."""

@@ -2,12 +2,13 @@
 
 On a plane seen in perspective sizes grow linearly with the row. A region may hold several riders, or a part
 of one, and shadows; but those that hold one are of one size, while the others are of any. So the line is
-scaled to the mode of the regions' sizes, and then fitted to what lies about it by a redescending estimator
-(Welsch's; Holland, Welsch, Robust regression using iteratively reweighted least-squares, 1977).
+voted for, with one horizon for widths and heights, and then fitted to what lies about it by a redescending
+estimator (Welsch's; Holland, Welsch, Robust regression using iteratively reweighted least-squares, 1977).
 """
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,16 +17,23 @@ Floats = NDArray[np.float64]
 CAPACITY = 600
 """Samples that are kept: the newest."""
 ENOUGH = 30
-BEYOND = 0.15
+BEYOND = 0.4
 """How far beyond the rows that were sampled the line holds, as a share of the picture's height."""
 TOLERANCE = 0.25
 """Relative deviation at which a sample loses its say."""
-MODE_WIDTH = 0.15
-"""Spread of the logarithms of the sizes of single riders."""
 SMALLEST = 4.0
-# A slope must be told by the samples: this much holds it back, as if that many said there was none.
-_HELD = np.diag([0.0, 0.3])
-_FACTORS = np.linspace(-1.0, 0.5, 16)
+HORIZONS = (-1.0, -0.7, -0.5, -0.35, -0.25, -0.18, -0.12, -0.06, 0.0, 0.08, 0.16, 0.25, 0.35)
+"""Rows at which sizes may vanish, as shares of the picture's height; 0 is its upper border."""
+LEAST_BELOW = 0.05
+"""How far below the horizon a sample must lie to tell of it."""
+VOTE = 0.08
+"""Width of the bins in which the logarithms of the scales are counted."""
+SMOOTHING = 1.8
+"""By so many bins the sizes of single riders differ."""
+ASPECT, ASPECT_SPREAD = 0.45, 0.35
+"""Width of a machine with its rider over their height, from front or back; and its logarithm's spread."""
+# By so many samples about the voted lines each fitted one is held.
+_HELD = np.diag([3.0, 3.0])
 
 
 class SizeModel:
@@ -74,18 +82,37 @@ def robust_lines(places: Floats, sizes: Floats, rounds: int = 5) -> Floats:
         sizes: (K, 2) width and height, px.
         rounds: Of reweighting.
     """
-    design = np.stack([np.ones(len(places)), places - places.mean()], 1)
-    lines = _fitted(design, sizes, np.ones(len(places)))
-    ratios = np.log(sizes / np.maximum(design @ lines, SMALLEST))
-    near = np.exp(-0.5 * ((ratios[:, None] - _FACTORS[None, :, None]) / MODE_WIDTH) ** 2)
-    votes = near[:, :, 0].T @ near[:, :, 1]
-    lines *= np.exp(_FACTORS[np.array(np.unravel_index(votes.argmax(), votes.shape))])
+    voted = _voted(places, sizes)
+    middle = places.mean()
+    design = np.stack([np.ones(len(places)), places - middle], 1)
+    start = np.stack([voted[0] + voted[1] * middle, voted[1]])
+    lines = start
     for _ in range(rounds):
         deviation = ((sizes / np.maximum(design @ lines, SMALLEST) - 1.0) ** 2).sum(1)
-        lines = _fitted(design, sizes, np.exp(-0.5 * deviation / TOLERANCE**2) + 1e-6)
-    return np.stack([lines[0] - lines[1] * places.mean(), lines[1]])
+        weighted = design * np.exp(-0.5 * deviation / TOLERANCE**2)[:, None]
+        lines = start + np.linalg.solve(design.T @ weighted + _HELD, weighted.T @ (sizes - design @ start))
+    return np.stack([lines[0] - lines[1] * middle, lines[1]])
 
 
-def _fitted(design: Floats, sizes: Floats, weights: Floats) -> Floats:
-    weighted = design * weights[:, None]
-    return np.asarray(np.linalg.solve(design.T @ weighted + _HELD, weighted.T @ sizes), np.float64)
+def _voted(places: Floats, sizes: Floats) -> Floats:
+    """Return (2, 2) lines that vanish at one row: the horizon and the two scales that most samples share."""
+    most, best = -1.0, np.zeros((2, 2))
+    for horizon in HORIZONS:
+        below = places > horizon + LEAST_BELOW
+        if not below.any():
+            continue
+        scales = np.log(sizes[below] / (places[below] - horizon)[:, None])
+        low = scales.min(0) - VOTE
+        at = ((scales - low) / VOTE).astype(np.int64)
+        across, down = at.max(0) + 2
+        votes = np.bincount(at[:, 1] * across + at[:, 0], minlength=int(across * down)).reshape(down, across)
+        smooth = cv2.GaussianBlur(votes.astype(np.float64), (9, 9), SMOOTHING, borderType=cv2.BORDER_CONSTANT)
+        centres = [low[k] + VOTE * (np.arange(n) + 0.5) for k, n in enumerate((across, down))]
+        off = (centres[0][None] - centres[1][:, None] - np.log(ASPECT)) / ASPECT_SPREAD
+        smooth *= np.exp(-0.5 * off**2)
+        if smooth.max() > most:
+            most = float(smooth.max())
+            row, column = np.unravel_index(smooth.argmax(), smooth.shape)
+            slopes = np.exp(np.array([centres[0][column], centres[1][row]]))
+            best = np.stack([-horizon * slopes, slopes])
+    return best

@@ -11,38 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.motorcycle_lane.background import BackgroundModel
+from tracker.motorcycle_lane.episode import EpisodeTracker
 from tracker.motorcycle_lane.flow import Flow
 from tracker.motorcycle_lane.front_end import look
 from tracker.motorcycle_lane.measuring import Measurer
 from tracker.motorcycle_lane.shadows import Shadows
 from tracker.motorcycle_lane.tracks import TrackStore
-from tracker.types import Diagnostics, Frame, Info, Predictions, Status, Tracks
+from tracker.types import Association, Diagnostics, Frame, Predictions, Status, Tracks
 
 # Of the filter's state (x, vx, y, vy) the order that is shown: cx, cy, vx, vy.
 SHOWN = np.array([0, 2, 1, 3])
 
 
-class MotorcycleLaneTracker:
+class MotorcycleLaneTracker(EpisodeTracker):
     """Follows the riders of a lane before a static camera."""
 
-    def __init__(self) -> None:
-        """Build the tracker; `start` begins an episode."""
-        self._diagnostics = Diagnostics()
-
-    def start(self, info: Info) -> None:
-        """Forget everything and get ready for an episode."""
-        self._info = info
-        self._background = BackgroundModel(info.width, info.height)
+    def _begin(self) -> None:
+        self._background = BackgroundModel(self._info.width, self._info.height)
         self._shadows = Shadows()
-        self._measurer = Measurer(info.width, info.height)
-        self._store = TrackStore(info.width, info.height, info.rate)
-        self._flow = Flow(info.width, info.height, info.rate)
-        self._diagnostics = Diagnostics()
-
-    @property
-    def diagnostics(self) -> Diagnostics:
-        """Mask, measurements, predictions and flags of the last frame."""
-        return self._diagnostics
+        self._measurer = Measurer(self._info.width, self._info.height)
+        self._store = TrackStore(self._info.width, self._info.height, self._info.rate)
+        self._flow = Flow(self._info.width, self._info.height, self._info.rate)
 
     @property
     def background(self) -> BackgroundModel:
@@ -57,7 +46,8 @@ class MotorcycleLaneTracker:
     def step(self, frame: Frame) -> Tracks:
         """Return the tracks of this frame; what was returned is final."""
         store = self._store
-        sight = look(frame.image, self._foreground(frame.image))
+        raw, behind = self._foreground(frame.image)
+        sight = look(frame.image, raw)
         store.predict(self._measurer.sizes)
         tracks = store.tracks
         predictions = Predictions(
@@ -68,6 +58,7 @@ class MotorcycleLaneTracker:
         joined = np.zeros(len(tracks), np.bool_)
         joined[at] = seen.joined
         store.update(seen, joined)
+        association = Association(ids=predictions.ids, beta=store.beta) if len(predictions.ids) else None
         tracks = store.tracks
         status = store.status()
         gone = (status == Status.CONFIRMED) & tracks.moved(1.0)
@@ -75,7 +66,12 @@ class MotorcycleLaneTracker:
             tracks.ids[gone], tracks.centres[gone], tracks.velocities[gone], tracks.sizes[gone, 1]
         )
         self._diagnostics = Diagnostics(
-            detections=self._clip(seen.boxes), mask=sight.mask, predictions=predictions, flags=flags
+            detections=self._clip(seen.boxes),
+            mask=sight.mask,
+            background=behind,
+            association=association,
+            predictions=predictions,
+            flags=flags,
         )
         return Tracks(
             ids=tracks.ids.copy(),
@@ -86,10 +82,11 @@ class MotorcycleLaneTracker:
             covariance=tracks.covariance[:, SHOWN[:, None], SHOWN],
         )
 
-    def _foreground(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Return (H, W) what is neither background nor a shadow on it."""
+    def _foreground(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]:
+        """Return (H, W) what is neither background nor a shadow on it, and (H, W, 3) the background."""
         raw = self._background.apply(image)
-        return self._shadows.remove(image, self._background.background, raw)
+        background = self._background.background
+        return self._shadows.remove(image, background, raw), background
 
     def _clip(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
         limits = np.array([self._info.width, self._info.height] * 2, float)

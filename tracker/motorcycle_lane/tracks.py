@@ -53,8 +53,9 @@ LONGEST_MISS = 1.0
 SAME = 0.6
 """IoU from which a track that is not confirmed, or was missed, is the other's double."""
 CONFIRMED, CONFIRMING_HITS = 0.9, 3
-MOVED = 0.4
-"""Rider heights that a track must have gone to be confirmed: leaves sway, and lights flicker, in place."""
+MOVED, ENTERED = 0.4, 0.12
+"""Rider heights that a track must have gone to be confirmed: leaves sway, and lights flicker, in place. Less
+is asked of one that began at the border, where riders come from."""
 IN_FRAME = 0.15
 SIZE_RATE, COLOUR_RATE = 0.1, 0.1
 USUAL_RATE = 0.01
@@ -79,6 +80,7 @@ class TrackArrays:
         sized: (N,) int64 frames in which its size was measured.
         stood: (N,) int64 successive frames in which it stood still.
         origins: (N, 2) where each was first seen, px.
+        asked: (N,) rider heights that it must go to be confirmed.
     """
 
     ids: NDArray[np.int64]
@@ -93,6 +95,7 @@ class TrackArrays:
     sized: NDArray[np.int64]
     stood: NDArray[np.int64]
     origins: Floats
+    asked: Floats
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -113,6 +116,7 @@ class TrackArrays:
             sized=np.zeros(0, np.int64),
             stood=np.zeros(0, np.int64),
             origins=np.zeros((0, 2)),
+            asked=np.zeros(0),
         )
 
     def keep(self, kept: NDArray[np.bool_]) -> None:
@@ -140,7 +144,7 @@ class TrackArrays:
         """(N, 4), reaching beyond the picture where the rider does."""
         return np.concatenate([self.centres - 0.5 * self.sizes, self.centres + 0.5 * self.sizes], 1)
 
-    def moved(self, heights: float) -> NDArray[np.bool_]:
+    def moved(self, heights: float | Floats) -> NDArray[np.bool_]:
         """Tell which tracks (N,) are so many rider heights away from where they began."""
         gone = np.hypot(*(self.centres - self.origins).T)
         return np.asarray(gone > heights * np.maximum(self.sizes[:, 1], SMALLEST_HEIGHT))
@@ -241,7 +245,9 @@ class TrackStore:
         hit = beta[:, 0] < 0.5
         t.hits = t.hits + hit
         t.misses = np.where(hit, 0, t.misses + 1)
-        t.confirmed = t.confirmed | ((t.existence > CONFIRMED) & (t.hits >= CONFIRMING_HITS) & t.moved(MOVED))
+        t.confirmed = t.confirmed | (
+            (t.existence > CONFIRMED) & (t.hits >= CONFIRMING_HITS) & t.moved(t.asked)
+        )
         still = np.hypot(*t.velocities.T) < STILL * t.sizes[:, 1]
         t.stood = np.where(still, t.stood + 1, 0)
         self._learn(seen, beta)
@@ -305,6 +311,7 @@ class TrackStore:
                 sized=seen.sized[at].astype(np.int64),
                 stood=np.zeros(count, np.int64),
                 origins=seen.centres[at],
+                asked=np.where(border, ENTERED, MOVED),
             )
         )
         self._next += count

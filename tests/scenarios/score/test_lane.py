@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.score.foreground import flashes
-from scenarios.score.lane import full_tracks, longest_gap
+from scenarios.score.lane import full_tracks, longest_gap, lost_riders
 from scenarios.score.params import ScoringParams
 from scenarios.score.summary import score
 from scenarios.shown import NO_MASK, ShownLog
@@ -31,14 +31,23 @@ def detected(frames):
 
 def test_what_was_never_shown_is_null():
     scores, difficulty = lane([[rider()]] * 20, [tracks((1, BOX))] * 20)
-    assert scores["detection"] == {"precision": None, "recall": None, "foreground_f": None}
-    assert scores["full_tracks"] == {"correct": 1, "total": 1}
+    assert set(scores["detection"].values()) == {None}
+    assert scores["full_tracks"] == {"correct": 1, "total": 1, "lost": 0}
     assert scores["wrong_way"] == {"present": 0, "flagged": None, "false": None}
     assert scores["absorbed_s"] is None
     assert scores["recovery_s"] is None
     assert "identification" not in scores
     assert difficulty["riders_in_view"] == {"mean": 1.0, "most": 1.0}
+    assert difficulty["partly_hidden"] == 0.0
     assert "traces" not in difficulty
+
+
+def test_riders_behind_others_are_partly_hidden_and_those_at_the_border_are_not():
+    behind = rider(1, AWAY, visible=0.6)
+    cut_off = rider(2, (0, 100, 40, 140), visible=0.6, in_frame=0.6)
+    difficulty = lane([[rider(), behind, cut_off]] * 12)[1]
+    assert difficulty["riders_in_view"]["mean"] == 3.0
+    assert difficulty["partly_hidden"] == pytest.approx(1 / 3)
 
 
 def test_training_frames_are_not_scored():
@@ -54,6 +63,8 @@ def test_a_blob_over_two_riders_is_one_hit_and_one_miss():
     scores, _ = lane([[left, right]] * 12, shown=detected([[(100, 100, 190, 140)]] * 12))
     assert scores["detection"]["precision"] == 1.0
     assert scores["detection"]["recall"] == 0.5
+    counts = {"riders": 20, "correct": 10, "false": 0, "missed": 10}
+    assert scores["detection"].items() >= counts.items()
 
 
 def test_detections_match_from_an_overlap_of_four_tenths():
@@ -107,10 +118,17 @@ def test_gaps_and_strays_have_limits_of_their_own():
         assert full_tracks(life, before + held, PARAMS) == found
 
 
+def test_a_rider_is_lost_where_no_one_id_is_on_it_for_a_fifth_of_its_frames():
+    life = {7: list(range(20)), 8: list(range(20)), 9: list(range(20))}
+    # On 7 one id for 4 frames, on 8 three ids for 3 frames each, on 9 none.
+    pairs = [[(7, 1)]] * 4 + [[(8, 2)]] * 3 + [[(8, 3)]] * 3 + [[(8, 4)]] * 3 + [[]] * 7
+    assert lost_riders(life, pairs, PARAMS) == {8, 9}
+
+
 def test_riders_seen_for_less_than_a_second_do_not_count():
     for frames, total in ((RATE, 1), (RATE - 1, 0)):
         cars = [[]] * 2 + [[rider()]] * frames + [[]] * 5
-        assert lane(cars)[0]["full_tracks"] == {"correct": 0, "total": total}
+        assert lane(cars)[0]["full_tracks"] == {"correct": 0, "total": total, "lost": total}
 
 
 def test_longest_gap():

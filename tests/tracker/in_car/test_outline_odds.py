@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracker.in_car.cues import COUNT
-from tracker.in_car.outline_odds import FIRST, HOPELESS, Trees, _sum, log_odds, trees
+from tracker.in_car.outline_odds import FIRST, HOPELESS, Trees, _sum, learnt_trees, log_odds
 
 
 def leaf(grown, node, row):
@@ -64,7 +64,7 @@ def test_sums_are_those_of_a_walk_through_random_trees(seed, count):
 
 
 def test_learnt_trees_are_well_formed():
-    grown = trees()
+    grown = learnt_trees()
     inner = grown.cues >= 0
     assert len(grown.roots) > FIRST
     assert grown.roots[0] == 0
@@ -78,15 +78,15 @@ def test_learnt_trees_are_well_formed():
 
 def test_learnt_trees_are_walked_and_given_up():
     rng = np.random.default_rng(3)
-    grown = trees()
+    grown = learnt_trees()
     # Near the limits that the trees ask for, so that all branches are taken.
     spread = [np.concatenate([grown.limits[grown.cues == cue], [0.0]]) for cue in range(COUNT)]
     found = np.stack([rng.choice(limits, 300) for limits in spread], axis=1).astype(float)
-    odds = log_odds(found)
+    odds = log_odds(found, learnt_trees())
     np.testing.assert_allclose(odds, [walk(grown, row) for row in found.astype(np.float32)], atol=1e-9)
     assert (odds < HOPELESS).any()
     assert (odds > HOPELESS).any()
 
 
 def test_no_outlines_no_odds():
-    assert log_odds(np.empty((0, COUNT))).shape == (0,)
+    assert log_odds(np.empty((0, COUNT)), learnt_trees()).shape == (0,)

@@ -13,6 +13,7 @@ from scenarios.score.summary import score
 from tests.tracker.in_car.reliefs import drawn_cars, relief_of
 from tracker import registry
 from tracker.in_car.features import Picture
+from tracker.in_car.outline_odds import learnt_trees
 from tracker.in_car.points import PointStore
 from tracker.in_car.vehicles import (
     AROUND,
@@ -65,7 +66,7 @@ def test_a_box_moves_and_grows_with_its_points():
     box = np.array([120.0, 105, 165, 140])
     rng = np.random.default_rng(0)
     points = points_at(rng.uniform(box[:2], box[2:], (20, 2)), owner=1)
-    store, vehicle = VehicleStore(rate=RATE), vehicle_at(box)
+    store, vehicle = VehicleStore(rate=RATE, trees=learnt_trees()), vehicle_at(box)
     shift, growth = np.array([0.8, 0.3]), 0.004
     for _ in range(90):
         middle = points.position.mean(0)
@@ -85,14 +86,17 @@ def test_a_point_that_does_not_move_along_is_let_go():
     box = (120, 105, 165, 140)
     points = points_at(np.random.default_rng(1).uniform(box[:2], box[2:], (9, 2)), owner=1)
     points.flow[4] = (5.0, 0.0)
-    store, vehicle = VehicleStore(rate=RATE), vehicle_at(box)
+    store, vehicle = VehicleStore(rate=RATE, trees=learnt_trees()), vehicle_at(box)
     store._carry(vehicle, points, points.flow)
     assert points.owner.tolist() == [1] * 4 + [0] + [1] * 4
     assert vehicle.box == pytest.approx(box)
 
 
 def test_without_points_a_vehicle_goes_on_and_is_missed():
-    store, vehicle = VehicleStore(rate=RATE), vehicle_at((120, 105, 165, 140), velocity=np.array([2.0, 0]))
+    store, vehicle = (
+        VehicleStore(rate=RATE, trees=learnt_trees()),
+        vehicle_at((120, 105, 165, 140), velocity=np.array([2.0, 0])),
+    )
     points = points_at(np.empty((0, 2)), owner=0)
     store._carry(vehicle, points, np.empty((0, 2)))
     assert vehicle.missed == 1
@@ -113,7 +117,7 @@ def test_without_points_a_vehicle_goes_on_and_is_missed():
     ],
 )
 def test_who_is_given_up(box, settings, stays):
-    store = VehicleStore(rate=RATE)
+    store = VehicleStore(rate=RATE, trees=learnt_trees())
     store.vehicles = [vehicle_at(box, **settings)]
     points = points_at([(140.0, 120.0)], owner=1)
     assert ended(store, points) == ([1] if stays else [])
@@ -121,7 +125,7 @@ def test_who_is_given_up(box, settings, stays):
 
 
 def test_of_two_boxes_on_one_vehicle_the_surer_stays():
-    store = VehicleStore(rate=RATE)
+    store = VehicleStore(rate=RATE, trees=learnt_trees())
     store.vehicles = [
         vehicle_at((120, 105, 165, 140), confirmed=True, odds=1.0),
         vehicle_at((122, 106, 160, 140), confirmed=True, odds=4.0),
@@ -131,7 +135,7 @@ def test_of_two_boxes_on_one_vehicle_the_surer_stays():
 
 
 def test_points_join_the_vehicle_they_move_with():
-    store = VehicleStore(rate=RATE)
+    store = VehicleStore(rate=RATE, trees=learnt_trees())
     store.vehicles = [vehicle_at((120, 105, 165, 140))]
     inside, outside, passing, doubtful = (140.0, 120.0), (180.0, 120.0), (150.0, 120.0), (130.0, 120.0)
     points = points_at([inside, outside, passing, doubtful], owner=0)
@@ -149,7 +153,7 @@ def test_nothing_is_begun_where_no_point_moves_like_a_vehicle():
     points = points_at(np.random.default_rng(2).uniform((122, 108), (163, 138), (30, 2)), owner=0)
     points.evidence[:] = -3.0
     ego = EgoMotion(focal=300.0, focus=(160.0, HORIZON), sure=True, rate=RATE)
-    store = VehicleStore(rate=RATE)
+    store = VehicleStore(rate=RATE, trees=learnt_trees())
     picture = Picture(grey=grey, red=np.zeros_like(grey), scale=1.0, brightness=float(grey.mean()))
     for _ in range(6):
         store.step(picture, points, np.zeros((30, 2)), ego, 4.0)

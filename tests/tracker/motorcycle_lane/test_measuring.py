@@ -37,7 +37,7 @@ def test_sizes_are_known_only_about_rows_that_were_seen():
     assert not model.known(np.array([100.0])).any()
     rows = np.linspace(60, 120, 40)
     model.learn(rows, np.stack([0.2 * rows, 0.4 * rows], 1))
-    assert model.known(np.array([20.0, 50.0, 90.0, 130.0, 230.0])).tolist() == [
+    assert model.known(np.array([-60.0, 20.0, 90.0, 200.0, 230.0])).tolist() == [
         False,
         True,
         True,
@@ -62,10 +62,38 @@ def test_pixels_inside_boxes_and_cores(seed):
     for k, (x0, y0, x1, y1) in enumerate(measuring.core_boxes(blobs.labels, blobs.boxes).astype(int)):
         ax, ay, bx, by = blobs.boxes[k].astype(int)
         part = blobs.labels[ay:by, ax:bx] == k + 1
-        wide = np.flatnonzero(part.sum(0) >= measuring.CORE * (by - ay))
-        tall = np.flatnonzero(part.sum(1) >= measuring.CORE * (bx - ax))
-        if len(wide) and len(tall):
-            assert (x0, x1, y0, y1) == (ax + wide[0], ax + wide[-1] + 1, ay + tall[0], ay + tall[-1] + 1)
+        above = part[: int(np.ceil((by - ay) * (1 - measuring.FEET)))]
+        wide = np.flatnonzero(above.sum(0) >= measuring.CORE * (by - ay))
+        wanted = (ax, ay, bx, by)
+        if len(wide):
+            tall = np.flatnonzero(
+                part[:, wide[0] : wide[-1] + 1].sum(1) >= measuring.CORE * (wide[-1] + 1 - wide[0])
+            )
+            if len(tall):
+                wanted = (ax + wide[0], ay + tall[0], ax + wide[-1] + 1, ay + tall[-1] + 1)
+        assert (x0, y0, x1, y1) == wanted
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=30, deadline=None)
+def test_riders_cut_off_by_the_border_are_measured_whole(seed):
+    """What the picture's border leaves of boxes of known size, made whole again, is the boxes."""
+    rng = np.random.default_rng(seed)
+    frame, size = np.array([60.0, 40.0]), np.array([14.0, 18.0])
+    low = rng.uniform(1.0 - size, frame - 1.0, (20, 2))
+    boxes = np.concatenate([low, low + size], 1)
+    visible = np.clip(boxes, 0.0, np.tile(frame, 2))
+    touches = np.concatenate([visible[:, :2] <= 0, visible[:, 2:] >= frame], 1)
+    whole = measuring.complete(visible, touches, np.tile(size, (20, 1)))
+    assert np.allclose(whole, boxes)
+    larger = measuring.complete(visible, np.zeros((20, 4), bool), np.tile(size, (20, 1)))
+    assert np.array_equal(larger, visible)
+
+
+def test_a_sliver_at_the_border_is_as_broad_as_a_rider():
+    sliver = np.array([[20.0, 37.0, 24.0, 40.0]])
+    below = np.array([[False, False, False, True]])
+    assert measuring.complete(sliver, below, np.array([[14.0, 18.0]])).tolist() == [[15.0, 37.0, 29.0, 55.0]]
 
 
 def joined_pair(offset):

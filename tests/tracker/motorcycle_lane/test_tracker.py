@@ -131,9 +131,9 @@ def test_masks_are_the_background_models(video):
     shown, paper = follow(NAMES[0], frames), follow(NAMES[1], frames)
     for image, (_, default), (_, plain) in zip(frames, shown, paper, strict=True):
         raw = ours.apply(image)
-        wanted = clean(shadows.remove(image, ours.background, raw), window=3)
+        wanted = clean(shadows.remove(image, ours.background, raw))
         assert np.array_equal(default.mask, wanted)
-        assert np.array_equal(plain.mask, clean(printed.apply(image), window=3))
+        assert np.array_equal(plain.mask, clean(printed.apply(image)))
 
 
 def test_the_baseline_does_not_depend_on_threads(video):

@@ -76,6 +76,16 @@ def plain_corner(counts, least, most):
     return min(max(peak + gaps.index(max(gaps)), least), most)
 
 
+def with_rims(mask, changed):
+    """Foreground, and what is changed beside a pixel that most of its neighbourhood agrees with."""
+    height, width = mask.shape
+    wide = np.pad(mask, 1, mode="edge")
+    median = [[wide[y : y + 3, x : x + 3].sum() > 4 for x in range(width)] for y in range(height)]
+    wide = np.pad(np.array(median), 1)
+    near = [[wide[y : y + 3, x : x + 3].any() for x in range(width)] for y in range(height)]
+    return mask | (changed & np.array(near))
+
+
 class PlainModel:
     """What `tracker.motorcycle_lane.background.BackgroundModel` is, slowly."""
 
@@ -131,14 +141,20 @@ class PlainModel:
         rate = max(p.rate, 1 / (self.frames + 1))
         self.earlier *= 1 - rate
         before = self.background.copy()
+        changed = np.zeros(self.shape, bool)
         for at in np.ndindex(self.shape):
             features = self.features(image, edges, at)
-            mask[at] = not self.pixel(at, image, features, far[at], moved[at], training, rate)
-        seen = ~mask
+            changed[at] = far[at] or (moved[at] and not p.uncovered)
+            mask[at] = changed[at] and not self.looks_like_background(at, features, moved[at], training)
+        learnt = with_rims(mask, changed) if p.rims else mask
+        for at in np.ndindex(self.shape):
+            features = self.features(image, edges, at)
+            self.learn(at, image, features, changed[at], not learnt[at], training, rate)
+        seen = ~learnt
         if p.follow_light and seen.any():
             sums, old = self.background[seen].sum(0), before[seen].sum(0)
             growth = np.where(old > 0, sums / np.maximum(old, 1e-9), 1)
-            self.background[mask] = np.minimum(self.background[mask] * growth, 255)
+            self.background[learnt] = np.minimum(self.background[learnt] * growth, 255)
         self.flashing = self.flashing + 1 if mask.mean() > p.flash_share and not training else 0
         self.frames += 1
         self.previous = image
@@ -165,25 +181,23 @@ class PlainModel:
         last = tuple(int(v) for v in self.previous[at])
         return now, tuple(edges[at]), tuple(v // 8 for v in last + now)
 
-    def pixel(self, at, image, features, far, moved, training, rate):
-        """Classify and learn; returns whether the pixel is background."""
+    def looks_like_background(self, at, features, moved, training):
+        tables, p_b = self.tables[at[0]][at[1]], self.p_b[at]
+        if training:
+            return tables[0].same(tables[0].entries[0][2], features[0])
+        if moved:
+            v, vb = tables[2].evidence(features[2])
+            return 2 * vb * p_b > v
+        (c, cb), (e, eb) = tables[0].evidence(features[0]), tables[1].evidence(features[1])
+        return 2 * cb * eb * p_b > c * e
+
+    def learn(self, at, image, features, changed, is_b, training, rate):
         p = self.parameters
         tables, p_b = self.tables[at[0]][at[1]], self.p_b[at]
-        moved = moved and (far or not p.uncovered)
-        if not far and not moved:
-            is_b = True
-        elif training:
-            is_b = tables[0].same(tables[0].entries[0][2], features[0])
-        elif moved:
-            v, vb = tables[2].evidence(features[2])
-            is_b = 2 * vb * p_b > v
-        else:
-            (c, cb), (e, eb) = tables[0].evidence(features[0]), tables[1].evidence(features[1])
-            is_b = 2 * cb * eb * p_b > c * e
-        if not far and not moved:
-            self.background[at] += p.image_rate * (image[at] - self.background[at])
-        elif is_b:
+        if is_b and changed:
             self.background[at] = image[at]
+        elif is_b:
+            self.background[at] += p.image_rate * (image[at] - self.background[at])
         self.p_b[at] = p_b = p_b + rate * (is_b - p_b)
         for table, feature in zip(tables, features, strict=True):
             table.learn(feature, is_b, rate, StatMode.JOINT if training else p.mode)
@@ -194,4 +208,3 @@ class PlainModel:
                     if 2 * entry[1] * p_b <= entry[0]:
                         entry[1] = (entry[0] - p_b * entry[1]) / (1 - p_b)
             self.p_b[at] = 1 - p_b
-        return is_b
