@@ -105,7 +105,11 @@ def run(
     cluster: Cluster = None,
     tracker: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME|module:object", help="Once or more; the scene's own if not said."),
+        typer.Option(
+            metavar="NAME|module:object",
+            help="Once or more; the scene's own if not said. One that starts at detections takes @DETECTOR: "
+            "@perfect, @noisy, @mask, or @ one of ours; with association@DETECTOR the association is true.",
+        ),
     ] = None,
     overrides: Overrides = None,
     boxes: Annotated[Boxes, typer.Option(help="Which boxes of the truth are scored.")] = Boxes.AMODAL,
@@ -129,7 +133,7 @@ def run(
     from scenarios.workers import open_workers
 
     for name in names:
-        make_tracker(name)
+        make_tracker(name, resolved)
     wanted = Run(scenario=resolved, seeds=chosen, trackers=names, boxes=boxes.value, odometry=odometry)
     place = whole_directory(out) if out else nullcontext()
     with (

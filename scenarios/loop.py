@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios import bridge, digest
+from scenarios.detections import Fed
 from scenarios.errors import InputError
 from scenarios.log import EpisodeLog, TraceLog
 from scenarios.shown import ShownRows
 from scenarios.spec import Scenario, spec_id
-from sim.params import AerialParams, InCarParams
 from tracker.base import Tracker
 from tracker.types import Diagnostics, Frame, Info, Traces, Tracks
 
@@ -74,20 +74,13 @@ def make_scene(scenario: Scenario, seed: int) -> Scene:
     Raises:
         InputError: If its recording is missing or too short.
     """
-    # With the traffic and the meshes: heavy.
+    from sim import scenes
     from sim.recorded import RecordingError
-    from sim.scenes.aerial import AerialScene
-    from sim.scenes.in_car import InCarScene
-    from sim.scenes.motorcycle_lane import MotorcycleLaneScene
 
-    if isinstance(scenario.params, InCarParams):
-        return InCarScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
-    if isinstance(scenario.params, AerialParams):
-        try:
-            return AerialScene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
-        except RecordingError as error:
-            raise InputError(str(error)) from error
-    return MotorcycleLaneScene(scenario.params, seed=seed, rate=scenario.rate)
+    try:
+        return scenes.make_scene(scenario.params, seed=seed, rate=scenario.rate, seconds=scenario.seconds)
+    except RecordingError as error:
+        raise InputError(str(error)) from error
 
 
 def track_observations(
@@ -192,6 +185,8 @@ class TrackerLog:
             frame: What it is given.
             observation: With the truth that its traces are scored by; None for a recording.
         """
+        if isinstance(self.tracker, Fed) and observation is not None:
+            self.tracker.look(frame, observation)
         started = time.perf_counter()
         tracks = self.tracker.step(frame)
         self.track_ms.append(_milliseconds_since(started))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenarios import manifest as manifests
+from scenarios.detections import make_fed
 from scenarios.errors import InputError
 from scenarios.log import EpisodeLog, save
 from scenarios.loop import run_episode
@@ -67,14 +68,21 @@ class Run:
         return folder / tracker.replace(":", "-").replace("/", "-") if len(self.trackers) > 1 else folder
 
 
-def make_tracker(name: str) -> Tracker:
-    """Build a tracker by its name.
+def make_tracker(name: str, scenario: Scenario | None = None, seed: int = 0) -> Tracker:
+    """Build a tracker by its name; one that starts at detections is fed with them (`scenarios.detections`).
+
+    Args:
+        name: Of a tracker, or ``tracker@detector``.
+        scenario: What is driven; None for a recording, which has no truth to make detections of.
+        seed: Which of its drives: the errors of detectors with errors are drawn from it.
 
     Raises:
         InputError: If there is none, or it cannot be built.
     """
     try:
-        return make(name)
+        if scenario is None:
+            return make(name)
+        return make_fed(name, scenario.scene, rate=scenario.rate, seed=seed)
     except ValueError as error:
         raise InputError(str(error)) from error
     except TypeError as error:
@@ -104,7 +112,7 @@ def execute(
     from scenarios.score.statistics import paired
 
     for name in run.trackers:
-        make_tracker(name)
+        make_tracker(name, run.scenario, run.seeds[0])
     by_seed = dict(
         (workers or ThisProcess()).each(
             partial(run_seed, run, directory),
@@ -136,7 +144,7 @@ def run_seed(
 
     if directory is not None and not directory.is_dir():
         raise InputError(f"--out: a worker does not see {directory.parent}; wanted a folder that all share")
-    trackers = {name: make_tracker(name) for name in run.trackers}
+    trackers = {name: make_tracker(name, run.scenario, seed) for name in run.trackers}
     documents = {}
     with ExitStack() as stack:
         recorders, chain = {}, manifests.Chain()

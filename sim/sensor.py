@@ -131,13 +131,14 @@ class Sensor:
         self._amplitude = noise_amplitude(params.noise)
         self._planes = np.empty((2, 3, camera.height, camera.width), np.uint8)
 
-    def expose(self, picture: Picture, tick: int, speed: float) -> Image:
+    def expose(self, picture: Picture, tick: int, speed: float, *, stops: float = 0.0) -> Image:
         """Record one frame.
 
         Args:
             picture: As rendered; it is left as it is.
             tick: The frame's number.
             speed: Of the camera, m/s: it slants the rain.
+            stops: By which more light is let in than the camera would choose.
 
         Returns:
             (H, W, 3) uint8.
@@ -156,7 +157,8 @@ class Sensor:
             )
         if self._light.night:
             image = _glare(image)
-        gain = self._exposure(image, tick)
+        # Coded values go with the root of the light.
+        gain = self._exposure(image, tick) * 2.0 ** (stops / 2)
         rng = stream(self._seed, "sensor", "noise", tick)
         room = np.array(self._tile.shape) - image.shape[:2]
         shifts = rng.integers(0, room, size=(4, 2))

@@ -63,6 +63,10 @@ class Scene(Protocol):
     camera: Camera
     stage: Stage
 
+    @property
+    def over(self) -> bool:
+        """Whether it has come to an end of its own, so that what follows would mean nothing."""
+
     def step(self, action: NDArray[np.float32] | None = None) -> WorldState:
         """Return the state of the next tick; the first call gives tick 0."""
 
@@ -115,7 +119,7 @@ class Simulation:
         picture, silhouettes = self._renderer.observe(state, camera, pose)
         clock.lap("render")
         speed = state.ego.speed if state.ego is not None else 0.0
-        image = self._sensor.expose(picture, state.tick, speed)
+        image = self._sensor.expose(picture, state.tick, speed, stops=state.handling.stops)
         clock.lap("sensor")
         truth = frame_truth(state, picture, silhouettes, camera, pose)
         clock.lap("truth")

@@ -171,6 +171,19 @@ class Lighting:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Handling:
+    """What is done to a camera on a mast at one tick.
+
+    Attributes:
+        pan: Radians by which it is turned to the right of where it was mounted to look.
+        stops: Stops of light by which its exposure is set above what it would choose.
+    """
+
+    pan: float = 0.0
+    stops: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class WorldState:
     """All that changes, at one tick; the scenery stands in the scene.
 
@@ -183,6 +196,7 @@ class WorldState:
         sway: (S, 2) how the scene's S pieces of scenery lean, as `Bodies.leans`, or None where the air is
             still.
         aloft: The camera, where it flies.
+        handling: What is done to the camera.
     """
 
     tick: int
@@ -192,6 +206,7 @@ class WorldState:
     lighting: Lighting = Lighting()
     sway: NDArray[np.float64] | None = None
     aloft: Aloft | None = None
+    handling: Handling = Handling()
 
     @property
     def time(self) -> float:

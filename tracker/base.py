@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.types import Diagnostics, Frame, Info, Intrinsics, Odometry, Status, Traces, Tracks
+from tracker.types import Detections, Diagnostics, Frame, Info, Intrinsics, Odometry, Status, Traces, Tracks
 
 
 @runtime_checkable
@@ -24,6 +25,17 @@ class Tracker(Protocol):
         """Forget everything and get ready for an episode."""
 
     def step(self, frame: Frame) -> Tracks:
+        """Return the tracks of this frame; what was returned is final."""
+
+
+@runtime_checkable
+class DetectionTracker(Protocol):
+    """Takes the detections of one episode's frames in order, and no pictures."""
+
+    def start(self, info: Info) -> None:
+        """Forget everything and get ready for an episode."""
+
+    def follow(self, detections: Detections) -> Tracks:
         """Return the tracks of this frame; what was returned is final."""
 
 
@@ -65,7 +77,7 @@ def check_tracker(tracker: object, *, frames: int = 8) -> None:
     order = (episodes[0], episodes[1], episodes[0])
     results = [_run(tracker, info, shown, broken) for info, shown in order]
     if len(results[0]) == len(results[2]) and any(
-        not _equal(first, again) for first, again in zip(results[0], results[2], strict=True)
+        first != again for first, again in zip(results[0], results[2], strict=True)
     ):
         broken.append(
             "start: an episode run again after another one gives other tracks; start must reset everything"
@@ -114,13 +126,13 @@ def _run(tracker: Tracker, info: Info, frames: list[Frame], broken: list[str]) -
         broken.extend(_faults(tracks))
         if isinstance(tracker, Diagnosable):
             broken.extend(_diagnostic_faults(tracker.diagnostics))
-        snapshots.append(_copy(tracks))
+        snapshots.append(deepcopy(tracks))
         results.append(tracks)
     try:
         tracker.step(frames[-1])
     except Exception as error:
         broken.append(f"step: raises {type(error).__name__} on a repeated picture: {error}")
-    if any(not _equal(one, snapshot) for one, snapshot in zip(results, snapshots, strict=True)):
+    if any(one != snapshot for one, snapshot in zip(results, snapshots, strict=True)):
         broken.append("step: changes tracks that it returned before; what was returned is final")
     return snapshots
 
@@ -189,15 +201,3 @@ def _array_faults(name: str, array: object, shape: tuple[int, ...], kind: type[n
     if array.shape != shape:
         return [f"{name}: shape {array.shape}, wanted {shape}"]
     return [f"{name}: not finite"] if not np.isfinite(array).all() else []
-
-
-def _copy(tracks: Tracks) -> Tracks:
-    return Tracks(ids=tracks.ids.copy(), boxes=tracks.boxes.copy(), status=tracks.status.copy())
-
-
-def _equal(one: Tracks, other: Tracks) -> bool:
-    return (
-        np.array_equal(one.ids, other.ids)
-        and np.array_equal(one.boxes, other.boxes)
-        and np.array_equal(one.status, other.status)
-    )

@@ -20,6 +20,12 @@ TRACKERS = {
     "motorcycle-lane:paper": "tracker.motorcycle_lane.paper:PaperTracker",
     "motorcycle-lane:mog2-nn": "tracker.motorcycle_lane.nearest:NearestTracker",
 }
+DETECTION_TRACKERS = {
+    "bytetrack": "tracker.adapters.bytetrack:ByteTrack",
+    "norfair": "tracker.adapters.norfair:Norfair",
+    "stone-soup-jpda": "tracker.adapters.stone_soup:Jpda",
+}
+"""Of others, that start at detections; each needs its own package (extra ``trackers``)."""
 
 
 def make(name: str) -> Tracker:
@@ -31,14 +37,23 @@ def make(name: str) -> Tracker:
     Raises:
         ValueError: If there is no such tracker, or calling it gives none.
     """
-    target = TRACKERS.get(name, name)
+    tracker = build(name)
+    if not isinstance(tracker, Tracker):
+        raise ValueError(f"{name!r} gives a {type(tracker).__name__}, without start(info) and step(frame)")
+    return tracker
+
+
+def build(name: str) -> object:
+    """Call what a name stands for, without looking at what that gives.
+
+    Raises:
+        ValueError: If there is nothing of that name.
+    """
+    target = (TRACKERS | DETECTION_TRACKERS).get(name, name)
     module_name, _, attribute = target.partition(":")
     try:
         factory = getattr(importlib.import_module(module_name), attribute)
     except (ImportError, AttributeError, ValueError) as error:
-        known = ", ".join(TRACKERS)
+        known = ", ".join((*TRACKERS, *DETECTION_TRACKERS))
         raise ValueError(f"no tracker {name!r}: {error}; wanted one of {known}, or module:object") from error
-    tracker = factory()
-    if not isinstance(tracker, Tracker):
-        raise ValueError(f"{name!r} gives a {type(tracker).__name__}, without start(info) and step(frame)")
-    return tracker
+    return factory()

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 
 class Status(IntEnum):
@@ -77,8 +77,28 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Detections:
+    """The M detections in one frame: what a tracker without eyes of its own starts at.
+
+    Attributes:
+        boxes: (M, 4) float64 x0, y0, x1, y1, px, half-open.
+        scores: (M,) float64 in [0, 1].
+        tick: Number of the frame, from 0.
+        time: Seconds.
+    """
+
+    boxes: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    tick: int
+    time: float
+
+    def __len__(self) -> int:
+        return len(self.boxes)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tracks:
-    """The N tracks of one frame.
+    """The N tracks of one frame. Equal ones agree in every number.
 
     Attributes:
         ids: (N,) int64, >= 1, unique in the frame, never used again for another object.
@@ -96,8 +116,26 @@ class Tracks:
     state: NDArray[np.float64] | None = None
     covariance: NDArray[np.float64] | None = None
 
+    __hash__ = None  # type: ignore[assignment]
+
     def __len__(self) -> int:
         return len(self.ids)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Tracks):
+            return NotImplemented
+        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        return all((a is None) == (b is None) and np.array_equal(a, b) for a, b in pairs)
+
+    @classmethod
+    def confirmed(cls, ids: ArrayLike, boxes: ArrayLike) -> Tracks:
+        """Return confirmed tracks of ids (N,) and boxes (N, 4)."""
+        numbers = np.asarray(ids, np.int64).reshape(-1)
+        return cls(
+            ids=numbers,
+            boxes=np.asarray(boxes, np.float64).reshape(-1, 4),
+            status=np.full(len(numbers), Status.CONFIRMED, np.uint8),
+        )
 
     @classmethod
     def none(cls) -> Tracks:

@@ -99,6 +99,11 @@ class AerialScene:
         """Whether vehicles have touched each other: the run is then invalid."""
         return self._traffic.collided
 
+    @property
+    def over(self) -> bool:
+        """Whether nothing more can come: a platform flies on for ever."""
+        return False
+
     def step(self, action: NDArray[np.float32] | None = None) -> WorldState:  # noqa: ARG002
         """Advance one tick; the first call gives tick 0. Nobody takes actions here."""
         if self._tick >= 0:

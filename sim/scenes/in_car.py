@@ -12,7 +12,7 @@ from sim.light import make_light
 from sim.params import InCarParams
 from sim.render.types import Stage
 from sim.rng import stream
-from sim.roads import build_road
+from sim.roads import LEAD_IN, build_road
 from sim.scenery import place_scenery
 from sim.simulation import Odometer
 from sim.traffic import Traffic
@@ -71,6 +71,14 @@ class InCarScene:
     def collided(self) -> bool:
         """Whether vehicles have touched each other: the drive is then invalid."""
         return self._traffic.collided
+
+    @property
+    def over(self) -> bool:
+        """Whether vehicles have touched each other, or the camera car has left the paved road or its end."""
+        x, y, _ = self._traffic.ego().position
+        s, d = (float(value) for value in self.road.locate(x, y))
+        right, left = self.road.paved
+        return self.collided or not (right <= d <= left and -LEAD_IN <= s <= self.road.length)
 
     def step(self, action: NDArray[np.float32] | None = None) -> WorldState:
         """Advance one tick; the first call gives tick 0.

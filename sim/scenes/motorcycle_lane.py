@@ -22,12 +22,16 @@ from sim.rng import stream
 from sim.roads import build_road
 from sim.scenery import place_scenery
 from sim.weather import ChangingLight, Wind
-from sim.world import WorldState
+from sim.world import Handling, WorldState
 
 LENGTH = 260.0
 """Metres of road."""
 FAR = 250.0
 """Metres: what lies farther is not drawn; the camera looks down."""
+PAN_RATE, PAN_MOST = 0.5, 0.4
+"""Rad/s of a full action, and how far the camera can be turned from where it was mounted to look, rad."""
+STOPS = 2.0
+"""Stops of light of a full action."""
 
 
 class MotorcycleLaneScene:
@@ -57,6 +61,7 @@ class MotorcycleLaneScene:
             stream(seed, "road"),
         )
         self._tick = -1
+        self._handling = Handling()
         self.rate = rate
         self.camera = Camera(
             width=mount.width,
@@ -72,24 +77,37 @@ class MotorcycleLaneScene:
             ground=road.ground(),
             light=make_light(params.light, seed),
         )
-        self._pose = Pose.looking(
-            (0.0, mount.mount_offset - lane.width / 2, mount.mount_height), yaw=mount.yaw, pitch=mount.pitch
-        )
+        self._mount = mount
+        self._place = 0.0, mount.mount_offset - lane.width / 2, mount.mount_height
         self._light = ChangingLight(params.light, seed)
         self._wind = Wind(self.stage.scenery, 0.01 * params.scenery.wind, seed)
         self._riders = RiderTraffic(
             params.riders,
             lane=(-lane.width, 0.0),
-            far=view_end(self.camera, self._pose),
+            far=view_end(self.camera, self._looking(0.0)),
             models=models,
             seed=seed,
             rate=rate,
         )
 
-    def step(self, action: NDArray[np.float32] | None = None) -> WorldState:  # noqa: ARG002
-        """Advance one tick; the first call gives tick 0. Nobody takes actions here."""
+    @property
+    def over(self) -> bool:
+        """False: the camera stands, and riders give way to each other."""
+        return False
+
+    def step(self, action: NDArray[np.float32] | None = None) -> WorldState:
+        """Advance one tick; the first call gives tick 0.
+
+        Args:
+            action: (2,) in [-1, 1]: how fast the camera pans, positive to the right, and by how much it is
+                exposed more or less; None leaves it alone, and so does zero.
+        """
         if self._tick >= 0:
             self._riders.step()
+            if action is not None:
+                pan, stops = (float(a) for a in np.clip(action, -1, 1))
+                turned = self._handling.pan + PAN_RATE / self.rate * pan
+                self._handling = Handling(pan=min(max(turned, -PAN_MOST), PAN_MOST), stops=STOPS * stops)
         self._tick += 1
         time = self._tick / self.rate
         return WorldState(
@@ -99,14 +117,18 @@ class MotorcycleLaneScene:
             ego=None,
             lighting=self._light.at(time),
             sway=self._wind.at(time),
+            handling=self._handling,
         )
 
-    def pose(self, state: WorldState) -> Pose:  # noqa: ARG002
-        """Return the camera's pose: always the same."""
-        return self._pose
+    def pose(self, state: WorldState) -> Pose:
+        """Return the camera's pose: it stands where it is mounted, and pans."""
+        return self._looking(state.handling.pan)
 
     def odometer(self, state: WorldState) -> None:
         """Return nothing: the camera is on no car."""
+
+    def _looking(self, pan: float) -> Pose:
+        return Pose.looking(self._place, yaw=self._mount.yaw - pan, pitch=self._mount.pitch)
 
 
 def view_end(camera: Camera, pose: Pose) -> float:
