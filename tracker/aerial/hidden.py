@@ -10,7 +10,7 @@ from tracker.aerial.calibration import Calibration
 from tracker.aerial.forecasts import Forecaster
 from tracker.aerial.occluders import Occluders
 from tracker.aerial.reacquisition import Appeared, Hidden, Matcher
-from tracker.aerial.stabilisation import transform
+from tracker.aerial.stabilisation import inverse, transform
 from tracker.aerial.tracks import Track, turn_to_velocity
 from tracker.aerial.trajectories import Trajectories
 
@@ -87,7 +87,7 @@ class HiddenVehicles:
         """Return the chance that a hidden vehicle, if it is there still, is not to be seen now."""
         values, axes = np.linalg.eigh(self.covariance(track))
         places = track.centre + np.outer(SIGMA * np.sqrt(values[1]), axes[:, 1])
-        shown = transform(np.linalg.inv(to_mosaic), places)
+        shown = transform(inverse(to_mosaic), places)
         framed = ((shown > RIM) & (shown < self._size - RIM)).all(1)
         return 1.0 - DETECTION * float(WEIGHTS @ (framed * self.occluders.visible(places, track.heading)))
 
@@ -103,7 +103,7 @@ class HiddenVehicles:
             unseen=np.array([self.unseen(track, to_mosaic) for track in self.tracks]),
         )
         centres = np.array([track.centre for track in new])
-        shown = transform(np.linalg.inv(to_mosaic), centres)
+        shown = transform(inverse(to_mosaic), centres)
         border = np.minimum(shown, self._size - shown).min(1)
         appeared = Appeared(
             centres=centres,

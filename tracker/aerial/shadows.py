@@ -72,7 +72,7 @@ class CastShadows:
     def _lengths(self, headings: Floats) -> Floats:
         """Return (N, 2) how far a shadow reaches along and across headings, px."""
         across = headings[:, ::-1] * np.array([-1.0, 1.0])
-        return np.abs(np.column_stack([headings @ self.offset, across @ self.offset]))
+        return np.asarray(np.abs(np.column_stack([headings @ self.offset, across @ self.offset])))
 
 
 def _sums(labels: Labels, at: tuple[NDArray[np.intp], ...], count: int) -> Floats:

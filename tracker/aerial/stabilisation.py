@@ -54,6 +54,11 @@ def transform(homography: Floats, points: Floats) -> Floats:
     return np.asarray(homogeneous[..., :2] / homogeneous[..., 2:])
 
 
+def inverse(homography: Floats) -> Floats:
+    """Return the homography (3, 3) back."""
+    return np.asarray(np.linalg.inv(homography), np.float64)
+
+
 def jacobian(homography: Floats, point: Floats) -> Floats:
     """Return (2, 2), the derivative of `transform` at a point (2,)."""
     x, y, w = homography @ np.append(point, 1.0)
@@ -93,7 +98,7 @@ class Stabiliser:
     def _register(self, grey: Grey, key: KeyFrame) -> Floats | None:
         chosen = np.flatnonzero(key.trust > 0.2)
         corners = key.corners[chosen]
-        guess = transform(np.linalg.inv(self._to_mosaic) @ key.to_mosaic, corners)
+        guess = transform(inverse(self._to_mosaic) @ key.to_mosaic, corners)
         now, status, _ = cv2.calcOpticalFlowPyrLK(
             key.grey,
             grey,
@@ -119,9 +124,9 @@ class Stabiliser:
 
     def _in_view(self, key: KeyFrame, grey: Grey) -> float:
         """Return the share of a key frame's corners in the picture; 0 where it is much turned."""
-        to_picture = np.linalg.inv(self._to_mosaic) @ key.to_mosaic
+        to_picture = inverse(self._to_mosaic) @ key.to_mosaic
         middle = 0.5 * np.array(grey.shape[::-1], float)
-        change = jacobian(to_picture, transform(np.linalg.inv(to_picture), middle)) - np.eye(2)
+        change = jacobian(to_picture, transform(inverse(to_picture), middle)) - np.eye(2)
         if np.abs(change).max() > 0.25:
             return 0.0
         places = transform(to_picture, key.corners)

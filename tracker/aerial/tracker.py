@@ -21,7 +21,7 @@ from tracker.aerial.measuring import free_outlines, outline
 from tracker.aerial.motion_context import ContextForecast
 from tracker.aerial.reacquisition import Fusion, Matcher
 from tracker.aerial.shadows import CastShadows
-from tracker.aerial.stabilisation import Floats, Stabiliser, jacobian, transform
+from tracker.aerial.stabilisation import Floats, Stabiliser, inverse, jacobian, transform
 from tracker.aerial.tracks import Track
 from tracker.aerial.trajectories import Trajectories
 from tracker.motorcycle_lane.blobs import Blobs, clean, find_blobs
@@ -104,7 +104,7 @@ class AerialTracker:
         own = self._shadows.lift(own)
         rest = find_blobs(left > 0, LEAST_AREA)
         free = self._shadows.lift(free_outlines(rest.labels, len(rest)))
-        to_picture = np.linalg.inv(to_mosaic)
+        to_picture = inverse(to_mosaic)
         cut = self._cut_off(transform(to_picture, own.corners() + origin))
         for k, track in enumerate(self._tracks):
             track.misses += 1
@@ -133,7 +133,7 @@ class AerialTracker:
 
     def _remember(self, image: NDArray[np.uint8], to_mosaic: Floats) -> None:
         """Keep paths and pictures of what is in full view."""
-        to_picture = np.linalg.inv(to_mosaic)
+        to_picture = inverse(to_mosaic)
         whole = [track for track in self._tracks if track.whole and track.misses == 0 and track.hits > 3]
         for track in whole:
             if track.confirmed:
@@ -205,7 +205,7 @@ class AerialTracker:
 
     def _shown(self, to_mosaic: Floats, seen: Floats) -> Tracks:
         hidden = self._hidden.tracks
-        to_picture = np.linalg.inv(to_mosaic)
+        to_picture = inverse(to_mosaic)
         everyone = [*self._tracks, *hidden]
         if not everyone:
             self._diagnostics = Diagnostics(detections=seen, predictions=None, homography=to_mosaic)

@@ -87,11 +87,11 @@ class Track:
 
     def went(self, lengths: float = 2.0) -> bool:
         """Tell whether it is so many of its lengths away from where it began."""
-        return float(np.hypot(*(self.centre - self.origin))) > lengths * self.size[0]
+        return float(np.hypot(*(self.centre - self.origin))) > lengths * float(self.size[0])
 
     def corners(self) -> Floats:
         """(4, 2) of its rectangle in the mosaic."""
-        return corners(self.centre[None], self.heading[None], self.size[None])[0]
+        return np.asarray(corners(self.centre[None], self.heading[None], self.size[None])[0])
 
 
 def begin(number: int, outlines: Outlines, k: int, tick: int) -> Track:
