@@ -103,7 +103,8 @@ def test_two_vehicles_that_touch_share_their_region():
     )
     assert np.allclose(found.centres, centres)
     assert np.allclose(found.sizes, size, atol=0.1)
-    assert not beaten.any() and not left.any()
+    assert not beaten.any()
+    assert not left.any()
 
 
 def test_in_a_region_that_is_one_vehicles_the_senior_track_stays():

@@ -61,8 +61,10 @@ def errors(kind: str, *, frames: int = 40, traffic: int = 0, seed: int = 3) -> n
     for k, to_ground in enumerate(flight):
         seen = view(picture, to_ground)
         for corner in np.mod(begins + k * speeds, [WIDTH, HEIGHT]).astype(int):
-            cv2.rectangle(seen, corner.tolist(), (corner + [24, 11]).tolist(), 240, -1)
-            cv2.rectangle(seen, (corner + [6, 2]).tolist(), (corner + [12, 8]).tolist(), 30, -1)
+            cv2.rectangle(seen, corner.tolist(), (corner + np.array([24, 11])).tolist(), 240, -1)
+            cv2.rectangle(
+                seen, (corner + np.array([6, 2])).tolist(), (corner + np.array([12, 8])).tolist(), 30, -1
+            )
         to_mosaic = stabiliser.step(seen)
         right = inverse(flight[0]) @ to_ground
         found.append(np.hypot(*(transform(to_mosaic, GRID) - transform(right, GRID)).T))
