@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from scenarios.log import EpisodeLog
 from scenarios.score.params import Boxes, ScoringParams
-from scenarios.score.preprocess import Selection, confirmed, kept_tracks, select, select_riders
+from scenarios.score.preprocess import (
+    Selection,
+    confirmed,
+    kept_tracks,
+    select,
+    select_from_above,
+    select_riders,
+)
 from scenarios.score.sequence import Sequence
 from sim.truth.standing import Standing
 from sim.truth.types import FrameTruth
@@ -62,6 +69,7 @@ class Selector:
             params: Thresholds.
         """
         self._lane = scene == "motorcycle-lane"
+        self._select_vehicles = select_from_above if scene == "aerial" else select
         self._size, self._boxes, self._params = (width, height), boxes, params
         self._clock = Standing(rate)
         self._next = 0
@@ -88,7 +96,9 @@ class Selector:
             "boxes": self._boxes,
             "params": self._params,
         }
-        return standing, select_riders(truth, standing, **how) if self._lane else select(truth, **how)
+        return standing, select_riders(truth, standing, **how) if self._lane else self._select_vehicles(
+            truth, **how
+        )
 
     def compare(
         self, frame: ScoredFrame
@@ -104,7 +114,7 @@ class Selector:
 def scored_frames(
     log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams
 ) -> Iterator[ScoredFrame]:
-    """Yield the frames that count: all of the in-car scene, those after the training of the lane."""
+    """Yield the frames that count: all, but of the lane those after the training."""
     selector = _selector(log, boxes, params)
     for truth, tracks in zip(log.truth, log.tracks, strict=True):
         frame = selector.take(truth, tracks)

@@ -54,6 +54,18 @@ def select(
     return Selection(boxes=clipped, scored=scored, ignored=present & ~scored & (truth.roles != Role.PARKED))
 
 
+def select_from_above(
+    truth: FrameTruth, *, width: int, height: int, boxes: Boxes = "amodal", params: ScoringParams
+) -> Selection:
+    """Decide which vehicles of a frame from the air are scored, and by which boxes."""
+    chosen = truth.box_amodal if boxes == "amodal" else truth.box_visible
+    clipped = clip(chosen, width, height)
+    present = box_area(clipped) > 0
+    clipped = np.where(present[:, None], clipped, np.nan)
+    scored = present & (truth.visible >= params.min_visible)
+    return Selection(boxes=clipped, scored=scored, ignored=present & ~scored)
+
+
 def select_riders(
     truth: FrameTruth,
     standing: Floats,

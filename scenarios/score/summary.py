@@ -13,6 +13,7 @@ from scenarios.score.identification import identification, judge_traces
 from scenarios.score.identity import identity
 from scenarios.score.lane import lane_scores
 from scenarios.score.params import Boxes, ScoringParams
+from scenarios.score.reacquisition import reacquisition
 
 DEFAULTS = ScoringParams()
 
@@ -32,11 +33,12 @@ def score(
         and None where what a score is computed from is missing.
     """
     traces = judge_traces(log, params)
-    special = (
-        lane_scores(log, boxes=boxes, params=params)
-        if log.scene == "motorcycle-lane"
-        else {"identification": identification(log, traces, boxes=boxes, params=params)}
-    )
+    if log.scene == "motorcycle-lane":
+        special = lane_scores(log, boxes=boxes, params=params)
+    elif log.scene == "aerial":
+        special = {"reacquisition": reacquisition(log, boxes=boxes, params=params)}
+    else:
+        special = {"identification": identification(log, traces, boxes=boxes, params=params)}
     scores = box_scores(log, boxes=boxes, params=params) | special
     return scores, difficulty(log, traces, boxes=boxes, params=params)
 

@@ -1,0 +1,166 @@
+"""Tracks in view, and vehicles out of sight, on small made-up inputs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracker.aerial import tracks
+from tracker.aerial.appearance import PATCH
+from tracker.aerial.forecasts import LinearForecast
+from tracker.aerial.hidden import LONGEST, PATIENCE, HiddenVehicles
+from tracker.aerial.measuring import Outlines
+from tracker.aerial.occluders import Occluders
+from tracker.aerial.reacquisition import Fusion
+from tracker.aerial.tracks import Track
+from tracker.aerial.trajectories import Trajectories
+
+SIZE = np.array([28.0, 12.0])
+RATE = 30.0
+BESIDE = 4000.0
+"""Px by which the camera has flown on: everything in the mosaic's first view is out of sight."""
+
+
+def outlines(*centres, size=SIZE) -> Outlines:
+    n = len(centres)
+    return Outlines(
+        centres=np.array(centres, float).reshape(n, 2),
+        headings=np.tile([1.0, 0.0], (n, 1)),
+        sizes=np.tile(size, (n, 1)),
+        pixels=np.full(n, int(SIZE.prod()), np.int64),
+    )
+
+
+def driven(
+    frames: int = 40, *, number: int = 1, y: float = 100.0, speed: float = 3.0, noise: float = 0.4
+) -> Track:
+    """Follow a vehicle that drives to the right from x = 50."""
+    rng = np.random.default_rng(number)
+    track = tracks.begin(number, outlines((50.0, y)), 0, 0)
+    for tick in range(1, frames):
+        tracks.predict([track])
+        track.misses += 1
+        centre = np.array([50.0 + speed * tick, y]) + rng.normal(0, noise, 2)
+        tracks.measure(track, centre, SIZE, tick, False)
+    return track
+
+
+def test_a_track_follows_and_heads_where_it_goes():
+    track = driven()
+    assert np.hypot(*(track.centre - [50 + 3 * 39, 100])) < 1.0
+    assert np.hypot(*(track.velocity - [3, 0])) < 0.3
+    assert abs(track.heading[0] - 1) < 1e-2
+    assert track.whole
+    assert track.went()
+    assert (track.misses, track.since) == (0, 39)
+
+
+def test_of_a_vehicle_that_drives_under_a_bridge_the_rear_tells_the_place():
+    track = driven()
+    for tick in range(40, 45):
+        tracks.predict([track])
+        centre, length = 50.0 + 3.0 * tick, SIZE[0] - 3.0 * (tick - 39)
+        # Its front is hidden: the middle of what is left lies behind that of the whole.
+        tracks.measure(
+            track, np.array([centre - 0.5 * (SIZE[0] - length), 100.0]), np.array([length, 12.0]), tick, False
+        )
+    assert not track.whole
+    assert abs(track.centre[0] - (50 + 3 * 44)) < 1.0
+    assert abs(track.size[0] - SIZE[0]) < 2.0
+
+
+def test_a_confirmed_track_does_not_jump():
+    track = driven()
+    track.confirmed = True
+    tracks.predict([track])
+    before = track.centre.copy()
+    assert not tracks.measure(track, before + np.array([0.0, 25.0]), SIZE, 40, False)
+    assert (track.centre == before).all()
+
+
+def test_a_first_outlines_axis_may_have_been_the_other():
+    track = tracks.begin(1, outlines((50.0, 100.0), size=np.array([30.0, 12.0])), 0, 0)
+    for tick in range(1, 8):
+        tracks.predict([track])
+        tracks.measure(track, np.array([50.0, 100.0 + 4.0 * tick]), track.size, tick, False)
+    assert abs(track.heading[1]) > 0.99
+    assert track.size[0] < track.size[1]
+
+
+def test_free_outlines_go_to_the_nearest_within_the_gate():
+    near, far = driven(number=1), driven(number=2, y=160.0)
+    rows, columns = tracks.take_free([near, far], outlines((168.0, 160.5), (166.0, 101.0), (400.0, 100.0)))
+    assert sorted(zip(rows.tolist(), columns.tolist(), strict=True)) == [(0, 1), (1, 0)]
+    assert not len(tracks.take_free([], outlines((1, 1)))[0])
+
+
+def hide(*vehicles: Track) -> HiddenVehicles:
+    """Let vehicles drive along and vanish at tick 39."""
+    trajectories = Trajectories()
+    hidden = HiddenVehicles(LinearForecast, Fusion(), 640, 480, RATE)
+    for track in vehicles:
+        speed = track.velocity[0]
+        for tick in range(40):
+            trajectories.append(track.id, tick, track.centre - [speed * (39 - tick), 0.0])
+        hidden.add(track, trajectories)
+    return hidden
+
+
+def picture(colour: float) -> np.ndarray:
+    return np.full(PATCH[0] * PATCH[1] * 3, colour)
+
+
+def test_who_comes_back_where_it_is_expected_gets_its_id_back():
+    white, black = driven(number=1), driven(number=2, y=130.0)
+    for track, colour in ((white, 220.0), (black, 30.0)):
+        track.pictures.extend(picture(colour + k) for k in range(6))
+    hidden = hide(white, black)
+    for tick in range(40, 70):
+        hidden.step(tick, np.eye(3))
+    assert len(hidden.tracks) == 2
+    new = tracks.begin(9, outlines((50.0 + 3 * 69, 131.0)), 0, 69)
+    new.pictures.append(picture(32.0))
+    ((old, found),) = hidden.reacquire([new], np.eye(3))
+    assert (old.id, found.id) == (2, 9)
+    assert [track.id for track in hidden.tracks] == [1]
+
+
+def test_a_stranger_far_away_stays_one():
+    hidden = hide(driven())
+    hidden.tracks[0].pictures.extend(picture(200.0 + k) for k in range(6))
+    hidden.step(45, np.eye(3))
+    new = tracks.begin(9, outlines((600.0, 400.0)), 0, 45)
+    new.pictures.append(picture(203.0))
+    assert hidden.reacquire([new], np.eye(3)) == []
+    assert len(hidden.tracks) == 1
+
+
+def test_who_should_be_seen_is_given_up_sooner_than_who_is_out_of_view():
+    away = np.array([[1.0, 0.0, BESIDE], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    in_view, out_of_view = hide(driven(speed=0.5)), hide(driven(speed=0.5))
+    road = np.column_stack([np.linspace(0, 640, 300), np.full(300, 100.0)])
+    for vehicles in (in_view, out_of_view):
+        for _ in range(30):
+            vehicles.occluders.see(road, [1.0, 0.0])
+    left = {"in view": 0, "out of view": 0}
+    for tick in range(40, 40 + round(RATE * LONGEST) + 10):
+        in_view.step(tick, np.eye(3))
+        out_of_view.step(tick, away)
+        left["in view"] += len(in_view.tracks)
+        left["out of view"] += len(out_of_view.tracks)
+    assert left["out of view"] == round(RATE * LONGEST)
+    assert left["in view"] == PATIENCE
+
+
+def test_cells_learn_way_by_way_where_vehicles_are_seen():
+    occluders = Occluders()
+    place, right, down = [[100.0, 100.0]], [1.0, 0.0], [0.0, 1.0]
+    assert occluders.visible(place, right)[0] == 0.5
+    for _ in range(20):
+        occluders.see(place, right)
+        occluders.miss(place, down)
+    assert occluders.visible(place, right)[0] > 0.9
+    assert occluders.visible(place, down)[0] < 0.1
+    assert occluders.visible([[300.0, 100.0]], right)[0] == 0.5
+    for _ in range(400):
+        occluders.miss(place, right)
+    assert occluders.visible(place, right)[0] < 0.3

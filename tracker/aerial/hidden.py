@@ -1,0 +1,119 @@
+"""The vehicles out of sight: where each is expected, whether it could be seen there, and which come back."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.aerial.appearance import PATCH
+from tracker.aerial.calibration import Calibration
+from tracker.aerial.forecasts import Forecaster
+from tracker.aerial.occluders import Occluders
+from tracker.aerial.reacquisition import Appeared, Hidden, Matcher
+from tracker.aerial.stabilisation import inverse, transform
+from tracker.aerial.tracks import Track, turn_to_velocity
+from tracker.aerial.trajectories import Trajectories
+
+Floats = NDArray[np.float64]
+
+LONGEST = 12.0
+"""Seconds after which a hidden vehicle is lost."""
+DETECTION = 0.95
+"""Chance that a vehicle in plain view is found."""
+GIVEN_UP = 0.2
+"""Chance of not having been seen below which a hidden vehicle is taken to have gone elsewhere ..."""
+PATIENCE = 45
+"""... once it has been so low for so many frames."""
+RIM = 10.0
+"""Px at the picture's border where nothing is sure to be seen."""
+INSIDE, ENTERING = 2e-5, 5e-4
+"""Vehicles never seen before that turn up, a px^2, inside the picture and where they come in."""
+ENTRY = 45.0
+"""Px of the border where vehicles come in."""
+SIGMA = np.array([0.0, 0.7, -0.7, 1.5, -1.5])
+"""Places along the longer axis of a forecast's ellipse, in standard deviations, and how they are weighed."""
+WEIGHTS = np.array([0.3, 0.22, 0.22, 0.13, 0.13])
+
+
+class HiddenVehicles:
+    """Keeps the hidden vehicles of one episode.
+
+    Attributes:
+        tracks: Those of now, each with a forecast.
+    """
+
+    def __init__(
+        self, forecaster: Forecaster, matcher: Matcher, width: int, height: int, rate: float
+    ) -> None:
+        self.tracks: list[Track] = []
+        self.occluders = Occluders()
+        self._forecaster, self._matcher = forecaster, matcher
+        self._calibration = Calibration(forecaster)
+        self._size = np.array([width, height], float)
+        self._longest = round(LONGEST * rate)
+        self._unlikely: dict[int, int] = {}
+
+    def rehearse(self, trajectories: Trajectories, tick: int, seen: list[int]) -> None:
+        """Let the calibration learn from what is seen."""
+        self._calibration.step(trajectories, tick, seen)
+
+    def add(self, track: Track, trajectories: Trajectories) -> None:
+        """Take in a track that is no longer seen."""
+        track.forecast = self._forecaster(trajectories, track.id)
+        self.tracks.append(track)
+
+    def step(self, tick: int, to_mosaic: Floats) -> None:
+        """Advance all forecasts, and give up who should have been seen, or has been away for too long."""
+        left = []
+        for track in self.tracks:
+            assert track.forecast is not None
+            track.forecast.step(tick)
+            turn_to_velocity(track)
+            low = self.unseen(track, to_mosaic) < GIVEN_UP
+            self._unlikely[track.id] = self._unlikely.get(track.id, 0) + 1 if low else 0
+            if tick - track.since <= self._longest and self._unlikely[track.id] <= PATIENCE:
+                left.append(track)
+            else:
+                del self._unlikely[track.id]
+        self.tracks = left
+
+    def covariance(self, track: Track) -> Floats:
+        """Return (2, 2) of a forecast, calibrated, px^2."""
+        assert track.forecast is not None
+        lead = max(track.misses, 1)
+        return self._calibration.scale(lead) * track.forecast.covariance
+
+    def unseen(self, track: Track, to_mosaic: Floats) -> float:
+        """Return the chance that a hidden vehicle, if it is there still, is not to be seen now."""
+        values, axes = np.linalg.eigh(self.covariance(track))
+        places = track.centre + np.outer(SIGMA * np.sqrt(values[1]), axes[:, 1])
+        shown = transform(inverse(to_mosaic), places)
+        framed = ((shown > RIM) & (shown < self._size - RIM)).all(1)
+        return 1.0 - DETECTION * float(WEIGHTS @ (framed * self.occluders.visible(places, track.heading)))
+
+    def reacquire(self, new: list[Track], to_mosaic: Floats) -> list[tuple[Track, Track]]:
+        """Return pairs of a hidden track and the new one that is the same vehicle; the hidden are let go."""
+        if not new or not self.tracks:
+            return []
+        none = np.zeros((0, PATCH[0] * PATCH[1] * 3))
+        hidden = Hidden(
+            centres=np.array([track.centre for track in self.tracks]),
+            covariances=np.array([self.covariance(track) for track in self.tracks]) + np.eye(2),
+            pictures=[np.array(track.pictures) if track.pictures else none for track in self.tracks],
+            unseen=np.array([self.unseen(track, to_mosaic) for track in self.tracks]),
+        )
+        centres = np.array([track.centre for track in new])
+        shown = transform(inverse(to_mosaic), centres)
+        border = np.minimum(shown, self._size - shown).min(1)
+        appeared = Appeared(
+            centres=centres,
+            pictures=np.array([np.mean(track.pictures, 0) for track in new]),
+            strangers=np.where(border < ENTRY, ENTERING, INSIDE),
+        )
+        rows, columns = self._matcher(hidden, appeared)
+        pairs = [(self.tracks[i], new[j]) for i, j in zip(rows.tolist(), columns.tolist(), strict=True)]
+        gone = {old.id for old, _ in pairs}
+        self.tracks = [track for track in self.tracks if track.id not in gone]
+        for number in gone:
+            self._unlikely.pop(number, None)
+        return pairs

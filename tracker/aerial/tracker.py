@@ -1,0 +1,258 @@
+"""The aerial tracker: paper 2's idea with its limits mended (registry name ``aerial``).
+
+The picture is laid onto a mosaic; what differs from the ground and moves is followed by Kalman filters. A
+vehicle that vanishes is forecast by its motion context; what appears anew is compared with the forecasts by
+place and looks, all at once, before it gets its id.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.aerial import appearance, tracks
+from tracker.aerial.background import Background
+from tracker.aerial.forecasts import WINDOW, Forecaster
+from tracker.aerial.hidden import HiddenVehicles
+from tracker.aerial.measuring import free_outlines, outline
+from tracker.aerial.motion_context import ContextForecast
+from tracker.aerial.reacquisition import Fusion, Matcher
+from tracker.aerial.shadows import CastShadows
+from tracker.aerial.stabilisation import Floats, Stabiliser, inverse, jacobian, transform
+from tracker.aerial.tracks import Track
+from tracker.aerial.trajectories import Trajectories
+from tracker.motorcycle_lane.blobs import Blobs, clean, find_blobs
+from tracker.types import Diagnostics, Frame, Info, Predictions, Status, Tracks
+
+LEAST_AREA = 30
+"""Smallest region that begins a track, px."""
+BORDER = 3.0
+"""Px from the picture's border within which an outline is cut off."""
+MOVED = 0.5
+"""Lengths that a track must have gone to be confirmed: what only seems to move does not go far."""
+COMPACT = 0.6
+"""Share of a rectangle that is foreground where a track begins: what is less may be two vehicles."""
+ENOUGH = 5
+"""Vehicles whose median size is the usual one."""
+LARGEST = np.array([1.4, 1.5])
+"""Length and width of a region, in usual ones, up to which it is one vehicle's."""
+USUAL_LIGHT = 100.0
+"""Grey level of the ground to which pictures are scaled: a shadow darkens vehicles and road."""
+GOES = 8.0
+"""Px in `WINDOW` frames from which on a track is rehearsed."""
+
+
+class AerialTracker:
+    """Follows vehicles from above, also where they cannot be seen."""
+
+    def __init__(self, *, forecaster: Forecaster = ContextForecast, matcher: Matcher | None = None) -> None:
+        """Build the tracker; `start` begins an episode.
+
+        Args:
+            forecaster: How hidden vehicles are forecast.
+            matcher: How new vehicles are compared with the hidden.
+        """
+        self._forecaster, self._matcher = forecaster, matcher or Fusion()
+        self._diagnostics = Diagnostics()
+
+    def start(self, info: Info) -> None:
+        """Forget everything and get ready for an episode."""
+        self._info = info
+        self._stabiliser, self._background = Stabiliser(), Background()
+        self._shadows = CastShadows()
+        self._trajectories = Trajectories()
+        self._tracks: list[Track] = []
+        self._hidden = HiddenVehicles(self._forecaster, self._matcher, info.width, info.height, info.rate)
+        self._ids = itertools.count(1)
+        self._tick = -1
+        self._diagnostics = Diagnostics()
+
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """Detections, predictions of hidden vehicles, and the homography of the last frame."""
+        return self._diagnostics
+
+    def step(self, frame: Frame) -> Tracks:
+        """Return the tracks of this frame; what was returned is final."""
+        self._tick += 1
+        image = np.ascontiguousarray(frame.image)
+        to_mosaic = self._stabiliser.step(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
+        tracks.predict(self._tracks)
+        seen = self._look(image, to_mosaic)
+        self._remember(image, to_mosaic)
+        self._hide()
+        self._hidden.step(self._tick, to_mosaic)
+        self._decide(to_mosaic)
+        return self._shown(to_mosaic, seen)
+
+    def _look(self, image: NDArray[np.uint8], to_mosaic: Floats) -> Floats:
+        """Measure the tracks, begin new ones; return the boxes (M, 4) of all outlines in the picture."""
+        kept = np.array([_box(track.corners()) for track in self._tracks if track.went()]).reshape(-1, 4)
+        mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
+        blobs = find_blobs(mask, LEAST_AREA // 2)
+        origin = self._background.origin + np.array(self._background.view[:2])
+        places = np.array([track.state[:, 0] for track in self._tracks]).reshape(-1, 2) - origin
+        headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
+        sizes = np.array([track.size for track in self._tracks]).reshape(-1, 2)
+        self._shadows.learn(self._background, blobs.labels, len(blobs))
+        senior = np.array([track.confirmed for track in self._tracks], np.bool_)
+        expected, wide = self._shadows.cast(places, headings, sizes)
+        own, beaten, left = outline(blobs.labels, self._single(blobs), senior, expected, headings, wide)
+        own = self._shadows.lift(own)
+        rest = find_blobs(left > 0, LEAST_AREA)
+        free = self._shadows.lift(free_outlines(rest.labels, len(rest)))
+        to_picture = inverse(to_mosaic)
+        cut = self._cut_off(transform(to_picture, own.corners() + origin))
+        for k, track in enumerate(self._tracks):
+            track.misses += 1
+            if own.pixels[k]:
+                tracks.measure(track, own.centres[k] + origin, own.sizes[k], self._tick, bool(cut[k]))
+        # Two tracks were on one vehicle.
+        self._tracks = [track for track, gone in zip(self._tracks, beaten, strict=True) if not gone]
+        missed = [track for track in self._tracks if track.misses]
+        free.centres[:] += origin
+        cut = self._cut_off(transform(to_picture, free.corners()))
+        rows, columns = tracks.take_free(missed, free)
+        for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
+            tracks.measure(missed[i], free.centres[j], free.sizes[j], self._tick, bool(cut[j]))
+        compact = free.pixels >= COMPACT * free.sizes.prod(1)
+        for j in np.setdiff1d(np.flatnonzero(compact & (free.pixels > 0)), columns).tolist():
+            self._tracks.append(tracks.begin(next(self._ids), free, j, self._tick))
+        found = np.concatenate([own.corners()[own.pixels > 0] + origin, free.corners()])
+        return _boxes(transform(to_picture, found))
+
+    def _single(self, blobs: Blobs) -> NDArray[np.bool_]:
+        """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of the known."""
+        sizes = free_outlines(blobs.labels, len(blobs)).sizes
+        known = np.array([track.size for track in self._tracks if track.confirmed and track.whole])
+        usual = np.median(known if len(known) > ENOUGH else sizes, axis=0) if len(sizes) else np.zeros(2)
+        return np.append(False, (sizes <= usual * LARGEST).all(1))
+
+    def _remember(self, image: NDArray[np.uint8], to_mosaic: Floats) -> None:
+        """Keep paths and pictures of what is in full view."""
+        to_picture = inverse(to_mosaic)
+        whole = [track for track in self._tracks if track.whole and track.misses == 0 and track.hits > 3]
+        for track in whole:
+            if track.confirmed:
+                self._trajectories.append(track.id, self._tick, track.centre)
+            if track.hits % tracks.PICTURE_EVERY == 0 or len(track.pictures) < 2:
+                middle = transform(to_picture, track.centre)
+                turn = jacobian(to_picture, track.centre)
+                across = track.heading[::-1] * np.array([-1.0, 1.0])
+                half = 0.5 * track.size
+                picture = appearance.cut(
+                    image, middle, turn @ (half[0] * track.heading), turn @ (half[1] * across)
+                )
+                track.pictures.append(picture * (USUAL_LIGHT / self._background.light(track.centre)))
+        if whole:
+            self._hidden.occluders.see(
+                np.array([track.centre for track in whole]), np.array([track.heading for track in whole])
+            )
+        known = [track.id for track in whole if track.confirmed and self._goes(track.id)]
+        self._hidden.rehearse(self._trajectories, self._tick, known)
+
+    def _goes(self, track: int) -> bool:
+        """Tell whether a track has a history long enough to be forecast, and moves."""
+        first, last = self._trajectories.extent(track)
+        if last < self._tick or last - first < WINDOW:
+            return False
+        way = np.diff(self._trajectories.at(track, [last - WINDOW, last]), axis=0)[0]
+        return float(np.hypot(*way)) > GOES
+
+    def _hide(self) -> None:
+        """End what was not found again; of what was a vehicle for sure a forecast is begun."""
+        for track in self._tracks:
+            if track.misses >= tracks.MOST_MISSES and track.confirmed and track.id in self._trajectories:
+                self._hidden.add(track, self._trajectories)
+        self._tracks = [track for track in self._tracks if track.misses < tracks.MOST_MISSES]
+
+    def _decide(self, to_mosaic: Floats) -> None:
+        """Confirm new tracks, and give those that are hidden vehicles their ids back."""
+        new = [
+            track
+            for track in self._tracks
+            if not track.confirmed
+            and track.whole
+            and track.hits >= tracks.CONFIRMING_HITS
+            and track.pictures
+            and track.went(MOVED)
+        ]
+        for old, track in self._hidden.reacquire(new, to_mosaic):
+            self._join(old, track)
+        for track in new:
+            track.confirmed = True
+            self._trajectories.append(track.id, self._tick, track.centre)
+
+    def _join(self, old: Track, track: Track) -> None:
+        """Let a new track go on as an old one; the way between them is learnt."""
+        assert old.forecast is not None
+        ticks = np.arange(old.since + 1, self._tick)
+        last = self._trajectories.at(old.id, [self._tick])[0]
+        share = np.linspace(0.0, 1.0, len(ticks) + 2)[1:-1, None]
+        self._hidden.occluders.miss(last + share * (track.origin - last), track.origin - last)
+        track.id = old.id
+        track.size = np.maximum(track.size, 0.9 * old.size)
+        old.pictures.extend(track.pictures)
+        track.pictures = old.pictures
+
+    def _cut_off(self, shown: Floats) -> NDArray[np.bool_]:
+        """Tell which rectangles (N, 4, 2) of the picture touch its border."""
+        limits = np.array([self._info.width, self._info.height], float) - BORDER
+        return np.asarray(((shown < BORDER) | (shown > limits)).any((1, 2)))
+
+    def _shown(self, to_mosaic: Floats, seen: Floats) -> Tracks:
+        hidden = self._hidden.tracks
+        to_picture = inverse(to_mosaic)
+        everyone = [*self._tracks, *hidden]
+        if not everyone:
+            self._diagnostics = Diagnostics(detections=seen, predictions=None, homography=to_mosaic)
+            return Tracks.none()
+        boxes = _boxes(transform(to_picture, np.array([track.corners() for track in everyone])))
+        middles = transform(to_picture, np.array([track.centre for track in everyone]))
+        turns = [jacobian(to_picture, track.centre) for track in everyone]
+        velocity = np.array([turn @ track.velocity for turn, track in zip(turns, everyone, strict=True)])
+        status = [_status(track) for track in everyone]
+        unseen = [k for k, track in enumerate(everyone) if status[k] == Status.COASTING]
+        covariances = [
+            turns[k]
+            @ (
+                everyone[k].covariance
+                if everyone[k].forecast is None
+                else self._hidden.covariance(everyone[k])
+            )
+            @ turns[k].T
+            for k in unseen
+        ]
+        self._diagnostics = Diagnostics(
+            detections=seen,
+            predictions=Predictions(
+                ids=np.array([everyone[k].id for k in unseen], np.int64),
+                centres=middles[unseen],
+                covariances=np.array(covariances).reshape(-1, 2, 2),
+            ),
+            homography=to_mosaic,
+        )
+        return Tracks(
+            ids=np.array([track.id for track in everyone], np.int64),
+            boxes=boxes,
+            status=np.array(status, np.uint8),
+            state=np.concatenate([middles, self._info.rate * velocity], 1),
+        )
+
+
+def _status(track: Track) -> Status:
+    if not track.confirmed:
+        return Status.TENTATIVE
+    return Status.COASTING if track.misses or track.forecast is not None else Status.CONFIRMED
+
+
+def _box(points: Floats) -> Floats:
+    return np.concatenate([points.min(-2), points.max(-2)], -1)
+
+
+def _boxes(points: Floats) -> Floats:
+    """Return the boxes (N, 4) around points (N, 4, 2)."""
+    return _box(points.reshape(-1, 4, 2))

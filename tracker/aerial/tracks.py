@@ -1,0 +1,183 @@
+"""The vehicles in view: Kalman filters in the mosaic, their outlines, births and deaths."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.aerial import appearance
+from tracker.aerial.forecasts import Forecast
+from tracker.aerial.measuring import Outlines, corners
+from tracker.filtering import kalman
+from tracker.filtering.assignment import assign
+
+Floats = NDArray[np.float64]
+
+NOISE = 0.8
+"""Standard deviation of a measured coordinate, px."""
+INTENSITY = 0.012
+"""Power spectral density of the white acceleration, px^2 / frame^3."""
+SPEED = 3.0
+"""Standard deviation of a new track's velocity, px a frame."""
+GATE = 12.0
+"""Squared Mahalanobis distance of a free region that a track may take."""
+WHOLE = 0.82
+"""Share of a vehicle's length that must be measured for it to be in full view."""
+CONFIRMING_HITS = 6
+MOST_MISSES = 2
+"""Successive misses after which a confirmed track is hidden, and any other one ends."""
+SLOWEST = 0.25
+"""Px a frame below which a heading is kept as it was."""
+GROW, SHRINK = 0.3, 0.04
+"""How fast the size follows larger and smaller outlines."""
+PICTURE_EVERY = 4
+
+
+@dataclass(slots=True)
+class Track:
+    """One vehicle.
+
+    Attributes:
+        id: >= 1.
+        state: (2, 2) x, vx; y, vy, px of the mosaic and px a frame.
+        spread: (2, 2, 2) covariance of each axis.
+        heading: (2,) unit vector.
+        size: (2,) length and width, px.
+        origin: (2,) where it was first seen.
+        hits: Frames measured.
+        misses: Successive frames not measured.
+        confirmed: Whether it is a vehicle for sure.
+        whole: Whether it was in full view when last measured.
+        pictures: What it looked like, (D,) each.
+        forecast: Of a track that is not seen.
+        since: Last tick at which it was seen.
+    """
+
+    id: int
+    state: Floats
+    spread: Floats
+    heading: Floats
+    size: Floats
+    origin: Floats
+    hits: int = 1
+    misses: int = 0
+    confirmed: bool = False
+    whole: bool = False
+    pictures: deque[Floats] = field(default_factory=lambda: deque(maxlen=appearance.MEMORY))
+    forecast: Forecast | None = None
+    since: int = 0
+
+    @property
+    def centre(self) -> Floats:
+        """(2,) where it is, or is expected."""
+        return self.state[:, 0] if self.forecast is None else self.forecast.point
+
+    @property
+    def velocity(self) -> Floats:
+        """(2,) px a frame."""
+        return self.state[:, 1] if self.forecast is None else self.forecast.velocity
+
+    @property
+    def covariance(self) -> Floats:
+        """(2, 2) of the centre, px^2."""
+        return np.diag(self.spread[:, 0, 0])
+
+    def went(self, lengths: float = 2.0) -> bool:
+        """Tell whether it is so many of its lengths away from where it began."""
+        return float(np.hypot(*(self.centre - self.origin))) > lengths * float(self.size[0])
+
+    def corners(self) -> Floats:
+        """(4, 2) of its rectangle in the mosaic."""
+        return np.asarray(corners(self.centre[None], self.heading[None], self.size[None])[0])
+
+
+def begin(number: int, outlines: Outlines, k: int, tick: int) -> Track:
+    """Begin a track at an outline."""
+    centre = outlines.centres[k]
+    return Track(
+        id=number,
+        state=np.column_stack([centre, np.zeros(2)]),
+        spread=np.tile(np.diag([NOISE**2, SPEED**2]), (2, 1, 1)),
+        heading=outlines.headings[k],
+        size=np.maximum(outlines.sizes[k], 4.0),
+        origin=centre.copy(),
+        since=tick,
+    )
+
+
+def predict(tracks: list[Track]) -> None:
+    """Advance tracks by a frame."""
+    if not tracks:
+        return
+    mean = np.concatenate([track.state for track in tracks])
+    spread = np.concatenate([track.spread for track in tracks])
+    kalman.predict(mean, spread, 1.0, INTENSITY)
+    for k, track in enumerate(tracks):
+        track.state, track.spread = mean[2 * k : 2 * k + 2], spread[2 * k : 2 * k + 2]
+
+
+def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool) -> bool:
+    """Correct a track by its outline along its heading.
+
+    Where a part is hidden the end that lies where it was expected is right, and the length is the track's.
+
+    Args:
+        track: Advanced to this frame.
+        centre: (2,) middle of the outline, px.
+        size: (2,) length and width, px.
+        tick: Of the frame.
+        blocked: Whether the outline touches the picture's border.
+
+    Returns:
+        Whether it was taken; what lies too far off is another vehicle's, as where one drives on a bridge.
+    """
+    across = track.heading[::-1] * np.array([-1.0, 1.0])
+    track.whole = bool(size[0] >= WHOLE * track.size[0]) and not blocked
+    apart = np.array([(centre - track.state[:, 0]) @ axis for axis in (track.heading, across)])
+    if not track.whole and track.hits > 3:
+        for axis in range(2):
+            missing = 0.5 * max(track.size[axis] - size[axis], 0.0)
+            # The middle of the whole, if its front, or its rear, is what is measured.
+            candidates = np.array([apart[axis] - missing, apart[axis] + missing])
+            apart[axis] = candidates[np.abs(candidates).argmin()]
+    at = track.state[:, 0] + apart[0] * track.heading + apart[1] * across
+    noise = NOISE**2 if track.whole else (3.0 * NOISE) ** 2
+    if track.confirmed:
+        squared = float(((at - track.state[:, 0]) ** 2 / (track.spread[:, 0, 0] + noise)).sum())
+        if squared > GATE:
+            return False
+    kalman.update(track.state, track.spread, np.arange(2), at, noise)
+    if track.whole or track.hits <= 3:
+        rate = np.where(size > track.size, GROW, SHRINK if track.hits > 3 else GROW)
+        track.size = np.maximum(track.size + rate * (size - track.size), 4.0)
+    else:
+        track.size = np.where(size > track.size, track.size + GROW * (size - track.size), track.size)
+    track.hits, track.misses, track.since = track.hits + 1, 0, tick
+    turn_to_velocity(track)
+    return True
+
+
+def turn_to_velocity(track: Track) -> None:
+    """Let a track that goes somewhere head there; a first outline's axis may have been the other one."""
+    speed = float(np.hypot(*track.velocity))
+    if speed < SLOWEST or (track.forecast is None and track.hits < 3):
+        return
+    heading = track.velocity / speed
+    if track.hits <= 4 and abs(float(heading @ track.heading)) < 0.7 and track.size[0] > 1.2 * track.size[1]:
+        track.size = track.size[::-1].copy()
+    rate = 1.0 if track.hits <= 6 else min(0.25 * speed, 1.0)
+    mixed = (1.0 - rate) * track.heading * np.sign(heading @ track.heading + 1e-9) + rate * heading
+    track.heading = mixed / np.hypot(*mixed)
+
+
+def take_free(tracks: list[Track], outlines: Outlines) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Assign free outlines to tracks without one, within a gate: rows of tracks, and of outlines."""
+    if not tracks or not len(outlines.centres):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    places = np.array([track.state[:, 0] for track in tracks])
+    spread = np.array([track.spread[:, 0, 0] for track in tracks]) + NOISE**2 + 4.0
+    squared = ((outlines.centres[None] - places[:, None]) ** 2 / spread[:, None]).sum(-1)
+    return assign(np.where(outlines.pixels > 0, squared, np.inf), GATE)
