@@ -101,8 +101,8 @@ class AerialScene:
 
     @property
     def over(self) -> bool:
-        """Whether nothing more can come: a platform flies on for ever."""
-        return False
+        """Whether vehicles have touched each other: a platform itself flies on for ever."""
+        return self.collided
 
     def step(self, action: NDArray[np.float32] | None = None) -> WorldState:  # noqa: ARG002
         """Advance one tick; the first call gives tick 0. Nobody takes actions here."""

@@ -14,7 +14,7 @@ from sim.recorded import RecordingError, headings, read, resample
 from sim.scenes.aerial import AerialScene
 from sim.world import Kind
 
-REAL = Path("/work/shared/real/aerial")
+REAL = Path(__file__).resolve().parents[3] / "shared" / "real" / "aerial"
 absent = pytest.mark.skipif(
     not REAL.is_dir(),
     reason=f"the recordings are not here: {REAL} is no folder; what reads them is NOT tested",
