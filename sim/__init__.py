@@ -6,6 +6,7 @@ Importing it registers the environments (`sim.env`) with gymnasium, and does no 
 from gymnasium.envs.registration import register
 
 _ENVIRONMENTS = {
+    "Aerial": ("AerialEnv", "aerial-convoy"),
     "InCar": ("InCarEnv", "in-car-day"),
     "MotorcycleLane": ("MotorcycleLaneEnv", "lane-day"),
 }

@@ -17,14 +17,14 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from sim.params import InCarParams, MotorcycleLaneParams
+from sim.params import AerialParams, InCarParams, MotorcycleLaneParams
 from sim.scenes import make_scene
 from sim.simulation import Observation, Simulation
 from sim.truth.snapshot import Snapshot
 
 Image = NDArray[np.uint8]
 Action = NDArray[np.float32]
-AnyParams = InCarParams | MotorcycleLaneParams
+AnyParams = AerialParams | InCarParams | MotorcycleLaneParams
 
 SCENARIOS = "testtrack.scenarios"
 """Entry point group of functions ``load(name, overrides) -> Course``; the first one found is asked."""
@@ -56,7 +56,7 @@ class SceneEnv(gymnasium.Env[Image, Action]):
 
     Observations are frames, (H, W, 3) uint8 RGB. ``info["truth"]`` is a `sim.truth.snapshot.Snapshot`. An
     episode is truncated at the scenario's last frame, and terminated when the scene is over by itself
-    (`sim.simulation.Scene.over`): in a car after a collision, or off the paved road; the lane never is.
+    (`sim.simulation.Scene.over`): after a collision, in a car also off the paved road; the lane never is.
 
     ``reset(seed=N)`` gives the world that ``testtrack run --seed N`` gives, but for who drives; without a
     seed the next one is drawn from the environment's generator. ``reset(options=...)`` takes ``"scenario"``,
@@ -203,6 +203,30 @@ class InCarEnv(SceneEnv):
         if not isinstance(params, InCarParams):
             return params
         return params.model_copy(update={"ego": params.ego.model_copy(update={"driver": "actions"})})
+
+
+class AerialEnv(SceneEnv):
+    """A platform over traffic, which wind moves a little: the action flies it and zooms its camera.
+
+    It hovers where it is left alone, whatever drives below: to keep a convoy in view is the action's task.
+    Velocity is that of the place that the camera aims at. A tracker is told the focal length that an episode
+    begins with.
+    """
+
+    scene = "aerial"
+    actions = (
+        "velocity to the right",
+        "velocity ahead, toward the picture's upper edge",
+        "yaw rate, positive to the right",
+        "zoom, positive to the longer focal length",
+    )
+    of = AerialParams
+
+    def _driven(self, params: AnyParams) -> AnyParams:
+        if not isinstance(params, AerialParams):
+            return params
+        platform = params.platform.model_copy(update={"driver": "actions"})
+        return params.model_copy(update={"platform": platform})
 
 
 class MotorcycleLaneEnv(SceneEnv):

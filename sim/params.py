@@ -234,6 +234,8 @@ class AerialCameraParams(Params):
 class PlatformParams(Params):
     """How the platform flies."""
 
+    driver: Literal["script", "actions"] = "script"
+    """Who moves it: actions in place of `speed`, `sway` and the convoy; wind still moves it a little."""
     altitude: Annotated[FiniteFloat, Field(ge=60, le=400)] = 185.0
     """Metres above the ground, in the mean."""
     climb: Annotated[FiniteFloat, Field(ge=0, le=0.4)] = 0.06

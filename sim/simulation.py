@@ -57,7 +57,10 @@ class Observation:
 
 
 class Scene(Protocol):
-    """A populated world with a camera in it, made of parameters and a seed (`sim.scenes`)."""
+    """A populated world with a camera in it, made of parameters and a seed (`sim.scenes`).
+
+    The camera is that of the last state: a step may zoom it.
+    """
 
     rate: int
     camera: Camera
@@ -112,9 +115,9 @@ class Simulation:
 
     def step(self, action: NDArray[np.float32] | None = None) -> Observation:
         """Advance one tick and observe it."""
-        camera, clock = self.scene.camera, _Stopwatch()
+        clock = _Stopwatch()
         state = self.scene.step(action)
-        pose = self.scene.pose(state)
+        camera, pose = self.scene.camera, self.scene.pose(state)
         clock.lap("world")
         picture, silhouettes = self._renderer.observe(state, camera, pose)
         clock.lap("render")

@@ -44,15 +44,20 @@ class Platform:
         period, phase = self._sway
         return float(self._params.sway * np.sin(2 * np.pi * time / period + phase))
 
-    def pose(self, time: float, aim: Floats) -> Pose:
+    def heading(self, time: float) -> float:
+        """Return where it heads of its own, before it shakes, radians."""
+        return self._heading + self._params.turn * self._swing.at(time)
+
+    def pose(self, time: float, aim: Floats, turn: float = 0.0) -> Pose:
         """Return the camera's pose.
 
         Args:
             time: Seconds.
             aim: (2,) the place on the ground that it is to look at, before it roams.
+            turn: Radians by which it is steered to the left of its own heading.
         """
         p = self._params
-        heading = self._heading + p.turn * self._swing.at(time)
+        heading = self.heading(time) + turn
         height = p.altitude * (1 + p.climb * self._climb.at(time))
         tilt = max(self._camera.tilt + 0.035 * self._lean.at(time), 0.0)
         away = height * np.tan(tilt)

@@ -2,10 +2,12 @@
 
 The traffic is highway-env's, level by level: who drives over a bridge never meets who drives below it. In its
 place may stand recorded traffic. The platform looks at a place that moves along the road, or at a convoy;
-where that swings to and fro, vehicles leave the picture and come back.
+where that swings to and fro, vehicles leave the picture and come back. Or actions steer it.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from sim import meshes
 from sim.aerial.platform import Platform
 from sim.aerial.replay import RecordedTraffic
 from sim.aerial.site import Area, furnish, lay_out
+from sim.aerial.steering import Steering
 from sim.aerial.traffic import AerialTraffic
 from sim.camera import Camera, Pose
 from sim.light import make_light
@@ -30,6 +33,8 @@ NEAR, SPAN = 0.25, 6.0
 """What is drawn, in mean altitudes."""
 FOLLOW = 1.6
 """Seconds that the aim lags behind a convoy."""
+LEEWAY = 60.0
+"""Metres by which actions may aim beside the way that the scene is made for."""
 
 
 class AerialScene:
@@ -37,7 +42,7 @@ class AerialScene:
 
     Attributes:
         rate: Ticks a second.
-        camera: The intrinsics.
+        camera: The intrinsics, as they were last zoomed.
         stage: What stands still, or sways.
     """
 
@@ -68,9 +73,11 @@ class AerialScene:
         recording = read(params.recording.path) if params.recording.path else None
         if recording is not None:
             models += rider_models()
-        self._layout = lay_out(params, seconds, seed, view_reach(self.camera, params), recording)
+        self._steered = params.platform.driver == "actions"
+        reach = view_reach(self.camera, params) + (LEEWAY if self._steered else 0.0)
+        self._layout = lay_out(params, seconds, seed, reach, recording)
         self._platform = Platform(params.platform, mount, across=self._layout.across + np.pi / 2, seed=seed)
-        site = furnish(params, self._layout, self._area(seconds), models, seed)
+        site = furnish(params, self._layout, self._area(seconds, reach), models, seed)
         self._traffic: AerialTraffic | RecordedTraffic
         if recording is None:
             self._traffic = AerialTraffic(params.traffic, self._layout, site.models, seed=seed, rate=rate)
@@ -93,6 +100,9 @@ class AerialScene:
         self._light = ChangingLight(params.light, seed)
         self._wind = Wind(site.scenery, 0.01 * params.scenery.wind, seed)
         self._aim = self._followed()
+        low, high = self._way(seconds)
+        self._bounds = low - LEEWAY, high + LEEWAY
+        self._steering = Steering(place=self._layout.aim(self._aim))
 
     @property
     def collided(self) -> bool:
@@ -104,10 +114,16 @@ class AerialScene:
         """Whether vehicles have touched each other: a platform itself flies on for ever."""
         return self.collided
 
-    def step(self, action: NDArray[np.float32] | None = None) -> WorldState:  # noqa: ARG002
-        """Advance one tick; the first call gives tick 0. Nobody takes actions here."""
+    def step(self, action: NDArray[np.float32] | None = None) -> WorldState:
+        """Advance one tick; the first call gives tick 0.
+
+        Args:
+            action: (4,) as `sim.aerial.steering.Steering` takes it, where ``platform.driver`` is "actions".
+        """
         if self._tick >= 0:
             self._traffic.step()
+            if self._steered and action is not None:
+                self._steer(action)
         self._tick += 1
         time, dt = self._tick / self.rate, 1 / self.rate
         self._aim += (self._followed() - self._aim) * -np.expm1(-dt / FOLLOW)
@@ -135,7 +151,17 @@ class AerialScene:
     def odometer(self, state: WorldState) -> None:
         """Return nothing: the camera is on no car."""
 
+    def _steer(self, action: NDArray[np.float32]) -> None:
+        heading = self._platform.heading(self._tick / self.rate) + self._steering.turn
+        self._steering = self._steering.after(action, heading, 1 / self.rate, self._bounds)
+        focal = self._params.camera.focal * self._steering.zoom
+        self.camera = replace(self.camera, focal=focal)
+
     def _pose_at(self, time: float) -> Pose:
+        if self._steered:
+            steering = self._steering
+            ahead = time - self._tick / self.rate
+            return self._platform.pose(time, steering.place + ahead * steering.velocity, steering.turn)
         along = self._aim + self._params.platform.speed * time + self._platform.sway(time)
         return self._platform.pose(time, self._layout.aim(along))
 
@@ -144,17 +170,22 @@ class AerialScene:
         place = self._traffic.convoy_at()
         return self._layout.start if place is None else place
 
-    def _area(self, seconds: float) -> Area:
-        """West, south, east and north of what the camera may come to see."""
+    def _way(self, seconds: float) -> tuple[Floats, Floats]:
+        """Give the lowest and the highest place, (2,) each, that is aimed at, before it roams."""
         p = self._params
-        reach = view_reach(self.camera, p) + p.platform.roam
         if p.traffic.convoy:
             seen = self._layout.course
         else:
             way = self._layout.start + np.array([0.0, p.platform.speed * seconds])
             places = np.linspace(way.min() - p.platform.sway, way.max() + p.platform.sway, 50)
             seen = np.array([self._layout.aim(float(s)) for s in places])
-        low, high = seen.min(axis=0) - reach, seen.max(axis=0) + reach
+        return seen.min(axis=0), seen.max(axis=0)
+
+    def _area(self, seconds: float, reach: float) -> Area:
+        """West, south, east and north of what the camera may come to see, ``reach`` metres from its aims."""
+        far = reach + self._params.platform.roam
+        low, high = self._way(seconds)
+        low, high = low - far, high + far
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 

@@ -16,7 +16,7 @@ from sim.render.context import RenderUnavailableError, context
 from tests.scenarios.fakes import SilentTracker
 from tracker.types import Frame, Info, Tracks
 
-SMALL = ("camera.width=96", "camera.height=64", "scenery.density=0.1")
+SMALL = ("camera.width=96", "camera.height=64")
 LANE = "sim:testtrack/MotorcycleLane-v0"
 
 
@@ -52,7 +52,7 @@ class ShiftedTracker(SilentTracker):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["InCar", "MotorcycleLane"])
+@pytest.mark.parametrize("name", ["Aerial", "InCar", "MotorcycleLane"])
 def test_gymnasium_finds_only_that_it_is_a_wrapper(name):
     env = gymnasium.make(f"sim:testtrack/{name}-v0", overrides=(*SMALL, "seconds=0.3"))
     with warnings.catch_warnings(record=True) as caught:

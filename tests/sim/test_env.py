@@ -6,21 +6,34 @@ import pickle
 import warnings
 from dataclasses import replace
 
+import av
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv
+from gymnasium.wrappers import RecordVideo
 
 import sim  # registers the environments
+from sim.camera import ground_homography
 from sim.env import SceneEnv
 from sim.render.context import RenderUnavailableError, context
 from sim.scenes import make_scene
 from sim.simulation import Simulation
 
-IN_CAR, LANE = (f"sim:testtrack/{name}-v0" for name in ("InCar", "MotorcycleLane"))
+AERIAL, IN_CAR, LANE = (f"sim:testtrack/{name}-v0" for name in ("Aerial", "InCar", "MotorcycleLane"))
 ALL = sorted(name for name in gymnasium.registry if name.startswith("testtrack/"))
-SMALL = ("camera.width=96", "camera.height=64", "seconds=0.3", "scenery.density=0.1")
+SMALL = ("camera.width=96", "camera.height=64", "seconds=0.3")
+SPARSE = {
+    "Aerial": (
+        "traffic.density=3",
+        "traffic.oncoming_density=2",
+        "scenery.trees=0.1",
+        "scenery.buildings=0.1",
+    ),
+    "InCar": ("traffic.density=3", "traffic.oncoming_density=2", "scenery.density=0.1"),
+    "MotorcycleLane": ("scenery.density=0.1",),
+}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -32,10 +45,16 @@ def _needs_gl():
 
 
 def small(name: str, *overrides: str, **kwargs) -> SceneEnv:
-    sparse = ("traffic.density=3", "traffic.oncoming_density=2") if "InCar" in name else ()
+    sparse = SPARSE[name.rpartition("/")[2].removesuffix("-v0")]
     made = gymnasium.make(name, overrides=(*SMALL, *sparse, *overrides), **kwargs).unwrapped
     assert isinstance(made, SceneEnv)
     return made
+
+
+def level(axis: np.ndarray) -> np.ndarray:
+    """Give an axis of a camera, laid on the ground."""
+    flat = np.array([axis[0], axis[1], 0.0])
+    return flat / np.linalg.norm(flat)
 
 
 def rollout(env: gymnasium.Env, seed: int, steps: int = 3) -> list:
@@ -58,7 +77,7 @@ def same(one: list, other: list) -> bool:
 
 def test_the_scenes_are_registered():
     assert sim.__name__ == "sim"
-    assert ALL == ["testtrack/InCar-v0", "testtrack/MotorcycleLane-v0"]
+    assert ALL == ["testtrack/Aerial-v0", "testtrack/InCar-v0", "testtrack/MotorcycleLane-v0"]
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -96,7 +115,8 @@ def test_a_seed_is_a_rollout_in_one_process_and_in_others(name):
     # Frame by frame in turn, in processes of their own.
     vector = AsyncVectorEnv([lambda: small(name)] * 2, context="spawn")
     try:
-        actions = np.random.default_rng(7).uniform(-1, 1, (3, 2)).astype(np.float32)
+        shape = one.action_space.shape
+        actions = np.random.default_rng(7).uniform(-1, 1, (3, *shape)).astype(np.float32)
         images, infos = vector.reset(seed=[500, 501])
         for k in range(4):
             for row, wanted in enumerate((first, other)):
@@ -106,6 +126,21 @@ def test_a_seed_is_a_rollout_in_one_process_and_in_others(name):
                 images, _, _, _, infos = vector.step(np.stack([actions[k]] * 2))
     finally:
         vector.close()
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_gymnasium_records_a_video_of_an_episode(name, tmp_path):
+    env = RecordVideo(small(name, render_mode="rgb_array"), str(tmp_path / "videos"), disable_logger=True)
+    env.reset(seed=500)
+    while not env.step(np.zeros(env.action_space.shape, np.float32))[3]:
+        pass
+    env.close()
+    (video,) = tmp_path.glob("videos/*.mp4")
+    with av.open(str(video)) as container:
+        pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(pictures) == 9
+    assert pictures[0].shape == (64, 96, 3)
+    assert pictures[0].std() > 5
 
 
 def test_without_a_seed_the_next_episode_follows_from_the_last_seed():
@@ -215,6 +250,48 @@ def test_an_action_of_zero_leaves_the_lanes_frames_as_they_are():
     images = [env.reset(seed=500)[0], *(env.step(np.zeros(2, np.float32))[0] for _ in range(2))]
     for image, wanted in zip(images, plain, strict=True):
         np.testing.assert_array_equal(image, wanted)
+
+
+def test_actions_fly_turn_and_zoom_the_platform():
+    env = small(AERIAL, "platform.jitter=0")
+    first = env.reset(seed=500)[1]["truth"]
+
+    def after(*action: float):
+        env.reset(seed=500)
+        for _ in range(6):
+            info = env.step(np.array(action, np.float32))[-1]
+        return info["truth"]
+
+    still, right, ahead, turned, nearer = (after(*row) for row in np.eye(5, 4, -1))
+    # Wind moves a platform that is left alone, by far less than it flies in a fifth of a second.
+    assert 0 < np.abs(still.pose.position - first.pose.position)[:2].max() < 2
+    aside, forward = still.pose.rotation[0], -still.pose.rotation[1]
+    np.testing.assert_allclose(right.pose.position - still.pose.position, 4 * level(aside), atol=0.02)
+    np.testing.assert_allclose(ahead.pose.position - still.pose.position, 4 * level(forward), atol=0.02)
+    np.testing.assert_array_equal(right.pose.rotation, still.pose.rotation)
+    assert turned.pose.rotation[0] @ still.pose.rotation[0] == pytest.approx(np.cos(0.5 * 6 / 30), abs=1e-3)
+    assert turned.pose.rotation[1] @ aside < 0, "the picture's upper edge turns to the right"
+    assert nearer.camera.focal / still.camera.focal == pytest.approx(np.exp(0.7 * 6 / 30))
+    assert still.camera == first.camera
+    for steered in (right, ahead, turned, nearer):
+        np.testing.assert_array_equal(steered.state.vehicles.positions, still.state.vehicles.positions)
+    velocity = right.state.aloft.velocity - still.state.aloft.velocity
+    np.testing.assert_allclose(velocity, 20 * level(aside), atol=0.3)
+    np.testing.assert_allclose(
+        nearer.vehicles.ground_to_image, ground_homography(nearer.camera, nearer.pose), rtol=1e-12
+    )
+
+
+def test_a_platform_that_is_left_alone_follows_no_convoy():
+    def flown(env: SceneEnv) -> float:
+        start = env.reset(seed=500)[1]["truth"].pose.position
+        for _ in range(env.course.frames - 1):
+            info = env.step(np.zeros(4, np.float32))[-1]
+        return float(np.hypot(*(info["truth"].pose.position - start)[:2]))
+
+    hovering = small(AERIAL, "seconds=3", "platform.jitter=0")
+    assert hovering.course.params.traffic.convoy
+    assert flown(hovering) < 15 < 3 * hovering.course.params.traffic.speed
 
 
 def test_snapshots_compare_by_every_number_and_go_anywhere():

@@ -52,7 +52,7 @@ def drive(riders: int, seed: int, directory: Path) -> dict[str, Any]:
         if wanted.items() <= kept.items():
             return kept
     run = Run(scenario=scenario, seeds=range(seed, seed + 1), trackers=TRACKERS)
-    documents = run_seed(run, seed, None)
+    documents = run_seed(run, None, seed)
     view = documents[TRACKERS[0]]["difficulty"]["riders_in_view"]
     found = wanted | {"in_view": view["mean"]}
     found["scores"] = {name: measured(documents[name]["scores"]) for name in TRACKERS}
