@@ -38,6 +38,8 @@ BEHIND = 0.5
 """Seconds over which image speeds are taken."""
 ALIKE = 60.0
 """Px/s within which speeds agree."""
+LARGER = 1.5
+"""Times as many as are in the flock have to move together for these to become the flock."""
 SETTLE, CENTRE = 1.0, 2.0
 """Seconds in which the platform takes on the flock's speed, and in which it makes up for its distance."""
 
@@ -70,13 +72,20 @@ class Centring:
             for k, path in self._paths.items()
             if len(path) == path.maxlen
         }
-        members = [speeds[k] for k in speeds if k in self._flock] or list(speeds.values())
-        if not members:
+        if not speeds:
             return self._towards(np.zeros(2))
-        common = np.median(members, axis=0)
+        alike = {
+            k: {j for j, other in speeds.items() if np.hypot(*(other - speed)) < ALIKE}
+            for k, speed in speeds.items()
+        }
+        most = max(alike.values(), key=len)
+        members = self._flock & speeds.keys()
+        if len(most) > LARGER * len(members):
+            self._flock = members = most
+        common = np.median([speeds[k] for k in members], axis=0)
         joining = {k for k, speed in speeds.items() if np.hypot(*(speed - common)) < ALIKE}
-        self._flock = (self._flock & set(here)) | joining
-        off = np.mean([here[k] for k in self._flock], axis=0) - self._middle if self._flock else np.zeros(2)
+        self._flock = (self._flock & here.keys()) | joining
+        off = np.mean([here[k] for k in self._flock], axis=0) - self._middle
         pull = off / CENTRE
         # Of second order, with a pole at each of the two times: what is off goes, at a steady speed too.
         self._steady = np.clip(self._steady + (common + pull) * UP / (FULL * SETTLE * self._rate), -1, 1)
