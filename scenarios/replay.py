@@ -82,7 +82,7 @@ def _episode(
         if progress is not None:
             progress(1)
 
-    trackers = {name: make_tracker(name) for name in manifest.trackers}
+    trackers = {name: make_tracker(name, manifest.scenario, seed) for name in manifest.trackers}
     try:
         run_episode(manifest.scenario, seed, trackers, odometry=manifest.odometry, on_frame=on_frame)
     except _Diverged as diverged:

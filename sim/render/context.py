@@ -37,7 +37,9 @@ def context() -> Any:
         import moderngl
 
         options: dict[str, Any] = {"standalone": True, "backend": "egl", "require": 430}
-        return moderngl.create_context(**options)
+        made = moderngl.create_context(**options)
+        _ = made.info  # asked once and kept; later another context, or none, may be current, which gives ""
+        return made
     except Exception as error:  # moderngl raises bare Exception, glcontext several kinds of its own
         raise RenderUnavailableError(str(error).splitlines()[0] if str(error) else repr(error)) from error
 

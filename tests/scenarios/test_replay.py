@@ -2,6 +2,7 @@
 
 import json
 
+import moderngl
 import pytest
 
 from scenarios import manifest as manifests
@@ -12,6 +13,7 @@ from scenarios.generate import generate
 from scenarios.replay import Divergence, replay
 from scenarios.runs import Run
 from scenarios.workers import ThisProcess
+from sim.render.context import context
 from tests.scenarios.fakes import observations
 from tests.scenarios.test_cli import MiddleTracker, call
 
@@ -98,6 +100,24 @@ def test_a_changed_parameter_is_found_where_it_shows(folder, tmp_path, key, valu
 def test_a_later_episode_is_named(folder, tmp_path):
     path = changed(folder, tmp_path, "episodes.1.frames.2.truth", "0" * 32)
     assert replay(manifests.read(path)) == Divergence(501, 2, "truth")
+
+
+@pytest.mark.usefixtures("gl")
+def test_a_tracker_of_detections_agrees_too(tmp_path):
+    scenario = spec.load("lane-day", ["seconds=0.1"])
+    runs.execute(Run(scenario=scenario, seeds=range(500, 501), trackers=("association@noisy",)), tmp_path)
+    assert replay(manifests.read(tmp_path / "manifest.json")) is None
+
+
+@pytest.mark.usefixtures("gl")
+def test_the_driver_is_named_whoever_holds_the_context():
+    with context():
+        pass
+    named = manifests.environment()["driver"]
+    other = moderngl.create_context(standalone=True, backend="egl")
+    with other:
+        assert manifests.environment()["driver"] == named
+    assert len(named) > 20
 
 
 @pytest.mark.usefixtures("gl")

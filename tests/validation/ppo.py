@@ -13,6 +13,7 @@ import argparse
 from collections.abc import Sequence
 
 import gymnasium
+import torch._dynamo  # noqa: F401  PyTorch loads it late, which crashes once Mesa has brought its own LLVM
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 
