@@ -116,6 +116,9 @@ def run(
     odometry: Annotated[
         bool, typer.Option("--odometry", help="Give the trackers the car's odometry.")
     ] = False,
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="Drop the frames that come while a tracker is still busy.")
+    ] = False,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
@@ -134,7 +137,14 @@ def run(
 
     for name in names:
         make_tracker(name, resolved)
-    wanted = Run(scenario=resolved, seeds=chosen, trackers=names, boxes=boxes.value, odometry=odometry)
+    wanted = Run(
+        scenario=resolved,
+        seeds=chosen,
+        trackers=names,
+        boxes=boxes.value,
+        odometry=odometry,
+        realtime=realtime,
+    )
     place = whole_directory(out) if out else nullcontext()
     with (
         open_workers(min(jobs, len(chosen)), cluster) as workers,

@@ -15,6 +15,7 @@ from scenarios import bridge, digest
 from scenarios.detections import Fed
 from scenarios.errors import InputError
 from scenarios.log import EpisodeLog, TraceLog
+from scenarios.realtime import Realtime
 from scenarios.shown import ShownRows
 from scenarios.spec import Scenario, spec_id
 from tracker.base import Tracker
@@ -185,7 +186,7 @@ class TrackerLog:
             frame: What it is given.
             observation: With the truth that its traces are scored by; None for a recording.
         """
-        if isinstance(self.tracker, Fed) and observation is not None:
+        if isinstance(self.tracker, Fed | Realtime) and observation is not None:
             self.tracker.look(frame, observation)
         started = time.perf_counter()
         tracks = self.tracker.step(frame)

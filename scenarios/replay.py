@@ -43,7 +43,7 @@ def replay(manifest: Manifest, progress: Progress | None = None) -> Divergence |
         RenderUnavailableError: If there is no off-screen OpenGL here.
     """
     for name in manifest.trackers:
-        make_tracker(name)
+        make_tracker(name, manifest.scenario)
     for seed, frames in manifest.episodes.items():
         found = _episode(manifest, seed, frames, progress)
         if found is not None:

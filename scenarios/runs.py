@@ -20,6 +20,7 @@ from scenarios.errors import InputError
 from scenarios.log import EpisodeLog, save
 from scenarios.loop import run_episode
 from scenarios.output import write_json
+from scenarios.realtime import Realtime
 from scenarios.score.params import Boxes, ScoringParams
 from scenarios.spec import Scenario
 from scenarios.workers import Progress, ThisProcess, Workers
@@ -45,6 +46,8 @@ class Run:
         trackers: Names, each once.
         boxes: Which truth is scored.
         odometry: Whether the trackers get the car's noisy odometry.
+        realtime: Whether frames that come while a tracker is busy are dropped (`scenarios.realtime`). Tracks
+            then depend on the machine, so a manifest leaves them out.
     """
 
     scenario: Scenario
@@ -52,6 +55,7 @@ class Run:
     trackers: tuple[str, ...]
     boxes: Boxes = "amodal"
     odometry: bool = False
+    realtime: bool = False
 
     @property
     def frames(self) -> int:
@@ -140,11 +144,13 @@ def run_seed(
     run: Run, directory: Path | None, seed: int, *, progress: Progress | None = None
 ) -> dict[str, Document]:
     """Run one episode, write what is kept of it, and return the document of each tracker by its name."""
-    from scenarios.score.summary import score
+    from scenarios.score.summary import details, score
 
     if directory is not None and not directory.is_dir():
         raise InputError(f"--out: a worker does not see {directory.parent}; wanted a folder that all share")
     trackers = {name: make_tracker(name, run.scenario, seed) for name in run.trackers}
+    if run.realtime:
+        trackers = {name: Realtime(tracker) for name, tracker in trackers.items()}
     documents = {}
     with ExitStack() as stack:
         recorders, chain = {}, manifests.Chain()
@@ -158,14 +164,18 @@ def run_seed(
                 tracks, diagnostics = shown[name]
                 recorder.frame(observation.image, tracks, diagnostics, observation.truth)
             if directory is not None:
-                chain.add(observation, {name: tracks for name, (tracks, _) in shown.items()})
+                repeatable = {} if run.realtime else shown
+                chain.add(observation, {name: tracks for name, (tracks, _) in repeatable.items()})
             if progress is not None:
                 progress(1)
 
         logs = run_episode(run.scenario, seed, trackers, odometry=run.odometry, on_frame=on_frame)
         for log in logs:
             scores, difficulty = score(log, boxes=run.boxes, params=SCORING)
-            documents[log.tracker] = _document(run, log, scores, difficulty)
+            documents[log.tracker] = _document(run, log, scores, difficulty) | {
+                "details": details(log, boxes=run.boxes, params=SCORING),
+                "dropped_frames": _dropped(trackers[log.tracker]),
+            }
             if directory is not None:
                 _keep(run, log, documents[log.tracker], recorders[log.tracker])
         if directory is not None:
@@ -177,7 +187,7 @@ def run_seed(
 def _manifest(run: Run, seed: int, chain: manifests.Chain) -> manifests.Manifest:
     return manifests.Manifest(
         scenario=run.scenario,
-        trackers=run.trackers,
+        trackers=() if run.realtime else run.trackers,
         odometry=run.odometry,
         environment=manifests.environment(),
         episodes={seed: chain.frames},
@@ -236,6 +246,7 @@ def _document(run: Run, log: EpisodeLog, scores: Document, difficulty: Document)
         "tracker": log.tracker,
         "boxes": run.boxes,
         "odometry": run.odometry,
+        "realtime": run.realtime,
         "frames": len(log.tracks),
         "scores": scores,
         "difficulty": difficulty,
@@ -245,6 +256,10 @@ def _document(run: Run, log: EpisodeLog, scores: Document, difficulty: Document)
         "fps": 1e3 / sum(timing.values()),
         "peak_rss_mb": peak_rss_mb(),
     }
+
+
+def _dropped(tracker: Tracker) -> int:
+    return tracker.dropped if isinstance(tracker, Realtime) else 0
 
 
 def peak_rss_mb() -> float:
@@ -266,6 +281,8 @@ def _joined(documents: list[Document]) -> Document:
         "frames": int(frames.sum()),
         "scores": over_seeds([d["scores"] for d in documents]),
         "difficulty": over_seeds([d["difficulty"] for d in documents]),
+        "details": over_seeds([d["details"] for d in documents]),
+        "dropped_frames": sum(d["dropped_frames"] for d in documents),
         # In the order of the seeds, whichever process was ready first.
         "hashes": {
             name: hashlib.sha256("".join(d["hashes"][name] for d in documents).encode()).hexdigest()

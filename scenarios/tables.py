@@ -49,9 +49,10 @@ def print_scores(document: Mapping[str, Any]) -> None:
         table.add_section()
         _add_rows(table, [run[section] for run in runs], prefix="" if section == "scores" else section)
     table.add_section()
-    for key in ("fps", "peak_rss_mb"):
+    for key in ("fps", "peak_rss_mb", *(("dropped_frames",) if first["realtime"] else ())):
         table.add_row(key, *(_text(run[key]) for run in runs))
     _console().print(table)
+    _print_details([run["details"] for run in runs], [run["tracker"] for run in runs])
     for pair in document.get("paired", ()):
         name = f"{pair['tracker']} less {pair['against']}, on the same frames"
         table = _table(name, "", "difference", "n")
@@ -59,6 +60,27 @@ def print_scores(document: Mapping[str, Any]) -> None:
             table.add_row(key, _text(difference), str(difference["n"]))
         if table.row_count:
             _console().print(table)
+
+
+def _print_details(details: Sequence[Mapping[str, Any]], trackers: Sequence[str]) -> None:
+    """Print what a closer look finds: how much is convention, where boxes are found, what covariances say."""
+    table = _table("either truth, amodal / visible boxes", "", *trackers)
+    for key in details[0]["conventions"]["amodal"]:
+        both = ([_text(one["conventions"][which][key]) for which in ("amodal", "visible")] for one in details)
+        table.add_row(key, *(" / ".join(pair) for pair in both))
+    _console().print(table)
+    table = _table("recall by stratum", "", "boxes", *trackers)
+    for quantity, strata in details[0]["strata"].items():
+        table.add_section()
+        table.add_row(f"[bold]{quantity}[/]")
+        for name, first in strata.items():
+            recalls = (_text(one["strata"][quantity][name]["recall"]) for one in details)
+            table.add_row(f"  {name}", str(first["boxes"]), *recalls)
+    _console().print(table)
+    if any(one["consistency"] for one in details):
+        table = _table("covariances of the position", "", *trackers)
+        _add_rows(table, [one["consistency"] or {} for one in details], prefix="")
+        _console().print(table)
 
 
 def print_recording(document: Mapping[str, Any]) -> None:

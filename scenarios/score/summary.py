@@ -6,6 +6,7 @@ from typing import Any
 
 from scenarios.log import EpisodeLog
 from scenarios.score.clear import clear
+from scenarios.score.consistency import consistency
 from scenarios.score.difficulty import difficulty
 from scenarios.score.frames import box_sequence
 from scenarios.score.hota import hota
@@ -14,6 +15,7 @@ from scenarios.score.identity import identity
 from scenarios.score.lane import lane_scores
 from scenarios.score.params import Boxes, ScoringParams
 from scenarios.score.reacquisition import reacquisition
+from scenarios.score.strata import strata
 
 DEFAULTS = ScoringParams()
 
@@ -41,6 +43,27 @@ def score(
         special = {"identification": identification(log, traces, boxes=boxes, params=params)}
     scores = box_scores(log, boxes=boxes, params=params) | special
     return scores, difficulty(log, traces, boxes=boxes, params=params)
+
+
+def details(log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams = DEFAULTS) -> dict[str, Any]:
+    """Look closer at one tracker on one episode.
+
+    Args:
+        log: The episode.
+        boxes: Which truth is scored.
+        params: Thresholds.
+
+    Returns:
+        ``conventions``: what is scored with either truth, so that it can be seen how much is convention;
+        ``strata`` by visible share, distance and apparent speed (`scenarios.score.strata`); ``consistency``
+        of the covariances (`scenarios.score.consistency`).
+    """
+    conventions: tuple[Boxes, ...] = ("amodal", "visible")
+    return {
+        "conventions": {which: box_scores(log, boxes=which, params=params) for which in conventions},
+        "strata": strata(log, boxes=boxes, params=params),
+        "consistency": consistency(log, boxes=boxes, params=params),
+    }
 
 
 def box_scores(
