@@ -69,6 +69,35 @@ def test_pictures_depth_and_masks_are_those_of_the_simulation(whole):
     assert any(found["mask"] for found in lines[0]["objects"])
 
 
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("in-car-day", ("traffic.density=4", "scenery.density=0.1", "camera.width=160", "camera.height=120")),
+        ("aerial-convoy", ("scenery.trees=0.1", "camera.width=160", "camera.height=120", "camera.focal=200")),
+    ],
+)
+@pytest.mark.parametrize("layout", ["mot", "kitti"])
+def test_the_other_scenes_are_written_too(name, overrides, layout, tmp_path):
+    scenario = spec.load(name, ["seconds=0.1", *overrides])
+    place = tmp_path / "set"
+    generate(dataset(layout, scenario=scenario, seeds=range(500, 501)), place, ThisProcess())
+    seen = []
+    run_episode(scenario, 500, {}, on_frame=lambda observation, _: seen.append(observation))
+    lines = [json.loads(line) for line in (place / "truth/0500/frames.jsonl").read_text().splitlines()]
+    assert len(lines) == len(seen) == 3
+    for line, observation in zip(lines, seen, strict=True):
+        np.testing.assert_array_equal(cv2.imread(str(place / line["image"]))[..., ::-1], observation.image)
+        truth = observation.truth
+        assert [found["id"] for found in line["objects"]] == truth.ids.tolist()
+        assert (line["ego"] is None) == (name == "aerial-convoy")
+        for found, ids, pixels in zip(line["objects"], truth.ids, truth.visible_px, strict=True):
+            if found["mask"]:
+                mask = naive_decode(found["mask"]["counts"], *found["mask"]["size"])
+                np.testing.assert_array_equal(mask, observation.ids == ids)
+                assert mask.sum() == pixels
+    assert any(found["mask"] for line in lines for found in line["objects"])
+
+
 def test_nothing_but_the_layout_is_left(whole):
     assert {entry.name for entry in whole.iterdir()} == {
         *(".dataset.json", "manifest.json", "seqmaps", "testtrack-train", "truth"),

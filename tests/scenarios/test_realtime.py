@@ -29,7 +29,7 @@ class SlowTracker:
     def __init__(self, clock: Clock, latencies: list[float]) -> None:
         self.clock, self.latencies = clock, latencies
 
-    def start(self, info: Info) -> None:
+    def start(self, info: Info) -> None:  # noqa: ARG002
         self.left = [*self.latencies]
 
     def step(self, frame: Frame) -> Tracks:

@@ -13,6 +13,7 @@ from scenarios import runs, spec
 from scenarios.log import load
 from scenarios.runs import Run
 from scenarios.workers import LocalPool
+from tracker.types import Tracks
 
 SILENT = "tests.scenarios.fakes:SilentTracker"
 MIDDLE = "tests.scenarios.test_cli:MiddleTracker"
@@ -124,3 +125,37 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(tmp_path):
     assert out == ""
     assert "Traceback" not in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cluster_gives_what_one_process_gives(tmp_path):
+    from distributed import LocalCluster
+
+    wanted = ("--seeds", "500:502", "--tracker", MIDDLE, "--tracker", "association@noisy")
+    alone = document(*wanted)
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        place = tmp_path / "out"
+        found = document(*wanted, "--cluster", cluster.scheduler_address, "--out", str(place))
+    assert found["paired"] == alone["paired"]
+    for one, other in zip(found["runs"], alone["runs"], strict=True):
+        for key in ("seeds", "frames", "scores", "difficulty", "details", "hashes"):
+            assert one[key] == other[key]
+    assert len(found["runs"]) == 2
+    assert sorted(p.name for p in place.glob("seed-*")) == ["seed-500", "seed-501"]
+    assert json.loads((place / "scores.json").read_text())["paired"] == alone["paired"]
+
+
+def test_in_real_time_a_tracker_that_is_never_ready_sees_one_more_frame():
+    slow = document("--tracker", "tests.scenarios.test_run:SleepyTracker", "--realtime")
+    assert (slow["realtime"], slow["dropped_frames"], slow["frames"]) == (True, 13, 15)
+    assert "dropped" not in slow["scores"]
+
+
+class SleepyTracker:
+    """Takes longer than the whole drive."""
+
+    def start(self, info):
+        pass
+
+    def step(self, frame):  # noqa: ARG002
+        time.sleep(0.6)
+        return Tracks.confirmed([1], [[0, 0, 9, 9]])
