@@ -1,0 +1,52 @@
+"""Datasets: frames a second that `testtrack generate` writes, at one and at two jobs, scene by scene.
+
+Run with ``python -m tests.benchmarks.datasets [--seconds S]``. What starts the processes and populates the
+worlds is part of it: the longer the drives, the less it weighs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from scenarios import spec
+from scenarios.dataset import Dataset
+from scenarios.generate import generate
+from scenarios.workers import open_workers
+from tests.benchmarks.lines import Line, table
+
+SCENARIOS = ("in-car-day", "aerial-bridge", "lane-day")
+JOBS = (1, 2)
+SEEDS = range(500, 504)
+"""Four drives: as many for each of two jobs."""
+
+
+def write(name: str, seconds: float, jobs: int) -> float:
+    """Write a dataset in the layout of MOTChallenge, with lossless pictures; return frames a second."""
+    dataset = Dataset(scenario=spec.load(name, [f"seconds={seconds}"]), seeds=SEEDS, format="mot")
+    with tempfile.TemporaryDirectory() as folder, open_workers(jobs) as workers:
+        began = time.perf_counter()
+        document = generate(dataset, Path(folder) / "set", workers)
+        return float(document["frames"] / (time.perf_counter() - began))
+
+
+def main(argv: list[str] | None = None) -> list[Line]:
+    """Write one dataset a scenario and number of jobs, and return their speeds."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seconds", type=float, default=5.0, help="length of a drive")
+    seconds = parser.parse_args(argv or []).seconds
+    return [
+        Line(
+            what=f"generate, frames a second, {name}, {jobs} job{'s' if jobs > 1 else ''}",
+            measured=write(name, seconds, jobs),
+        )
+        for name in SCENARIOS
+        for jobs in JOBS
+    ]
+
+
+if __name__ == "__main__":
+    print(table(main(sys.argv[1:])))
