@@ -1,4 +1,4 @@
-"""Stone Soup's JPDA, put together of its parts as its tutorials do."""
+"""Stone Soup's JPDA (exact, with its efficient hypothesis management), put together as its tutorials do."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class Jpda:
             ),
             deleter=deleter,
             detector=[],
-            data_associator=part["dataassociator.probability"].JPDA(
+            data_associator=part["dataassociator.probability"].JPDAwithEHM2(
                 part["hypothesiser.probability"].PDAHypothesiser(
                     predictor,
                     updater,
