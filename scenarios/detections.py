@@ -11,7 +11,7 @@ A tracker named ``TRACKER@DETECTOR`` is fed by that detector. From rung to rung 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -227,8 +227,9 @@ class Fed:
 
     @property
     def diagnostics(self) -> Diagnostics:
-        """What it was fed with."""
-        return Diagnostics(detections=self._detections.boxes)
+        """What it was fed with, and what the tracker shows of itself."""
+        shown = getattr(self._tracker, "diagnostics", None) or Diagnostics()
+        return replace(shown, detections=self._detections.boxes)
 
     def step(self, frame: Frame) -> Tracks:  # noqa: ARG002
         """Return the tracks of the frame that was looked at last."""

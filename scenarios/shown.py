@@ -26,12 +26,14 @@ class ShownLog:
         flags: T arrays (F_t,) int64, ids of tracks flagged as going the wrong way.
         mask_px: (T,) int64 pixels of the foreground mask, `NO_MASK` in a frame without one.
         object_px: T arrays (N_t,) int64, how many visible pixels of each vehicle of the truth the mask holds.
+        innovations: T arrays (K_t,), squared, in units of the covariances (`tracker.types.Diagnostics`).
     """
 
     detections: tuple[NDArray[np.float64], ...] | None
     flags: tuple[NDArray[np.int64], ...] | None
     mask_px: NDArray[np.int64] | None
     object_px: tuple[NDArray[np.int64], ...] | None
+    innovations: tuple[NDArray[np.float64], ...] | None = None
 
 
 class ShownRows:
@@ -40,6 +42,7 @@ class ShownRows:
     def __init__(self) -> None:
         self._detections: list[NDArray[np.float64] | None] = []
         self._flags: list[NDArray[np.int64] | None] = []
+        self._innovations: list[NDArray[np.float64] | None] = []
         self._mask_px: list[int] = []
         self._object_px: list[NDArray[np.int64]] = []
 
@@ -48,6 +51,8 @@ class ShownRows:
         boxes, flags, mask = diagnostics.detections, diagnostics.flags, diagnostics.mask
         self._detections.append(None if boxes is None else np.array(boxes, float).reshape(-1, 4))
         self._flags.append(None if flags is None else np.array(flags, np.int64).reshape(-1))
+        innovations = diagnostics.innovations
+        self._innovations.append(None if innovations is None else np.array(innovations, float).reshape(-1))
         if mask is None:
             self._mask_px.append(NO_MASK)
             self._object_px.append(np.zeros(len(truth), np.int64))
@@ -64,6 +69,7 @@ class ShownRows:
             flags=_filled(self._flags, np.zeros(0, np.int64)),
             mask_px=np.array(self._mask_px, np.int64) if masked else None,
             object_px=tuple(self._object_px) if masked else None,
+            innovations=_filled(self._innovations, np.zeros(0)),
         )
 
 
@@ -77,7 +83,8 @@ def _filled(frames: list[Any], empty: NDArray[Any]) -> Any:
 def to_arrays(shown: ShownLog) -> dict[str, NDArray[Any]]:
     """Return a log as flat arrays by name; ragged ones beside the number of rows of each frame."""
     arrays: dict[str, NDArray[Any]] = {}
-    for name, frames in (("detections", shown.detections), ("flags", shown.flags)):
+    for name in ("detections", "flags", "innovations"):
+        frames = getattr(shown, name)
         if frames is not None:
             arrays[f"{name}/rows"] = np.array([len(frame) for frame in frames], np.int64)
             arrays[name] = np.concatenate(frames)
@@ -101,4 +108,5 @@ def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ShownLog:
         flags=frames("flags"),
         mask_px=arrays.get("mask_px"),
         object_px=frames("object_px"),
+        innovations=frames("innovations"),
     )

@@ -203,6 +203,8 @@ class Diagnostics:
         predictions: Of hidden objects.
         homography: (3, 3) from this frame to the mosaic.
         flags: (F,) int64, ids of tracks flagged as going the wrong way.
+        innovations: (K,) float64, of K tracks that were updated: how far the centre of its detection lay from
+            where the track expected it, squared, in units of the expected covariance.
         profiles: (W,) float32 arrays by name, such as "segments", "intensity", "peaks".
     """
 
@@ -214,4 +216,5 @@ class Diagnostics:
     predictions: Predictions | None = None
     homography: NDArray[np.float64] | None = None
     flags: NDArray[np.int64] | None = None
+    innovations: NDArray[np.float64] | None = None
     profiles: dict[str, NDArray[np.float32]] = field(default_factory=dict)

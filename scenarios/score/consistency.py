@@ -30,16 +30,25 @@ def consistency(log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringPara
     Returns:
         ``nees``: the mean normalised estimation error squared of the position, 2 where the covariances are
         right, more where the tracker is too sure of itself; ``within_95``: the share of the errors in the
-        covariances' 95 % regions; ``errors``: how many there are. None where no track has a covariance.
+        covariances' 95 % regions; ``errors``: how many there are. The same of the innovations that it
+        shows: ``nis``, ``nis_within_95``, ``innovations``. None where there is nothing of either.
     """
-    found = np.concatenate([np.zeros(0), *errors(log, boxes=boxes, params=params)])
-    if not len(found):
-        return None
-    return {
-        "nees": float(found.mean()),
-        "within_95": float((found <= WITHIN).mean()),
-        "errors": len(found),
+    frames = errors(log, boxes=boxes, params=params)
+    squared = {
+        ("nees", "within_95", "errors"): np.concatenate([np.zeros(0), *frames]),
+        ("nis", "nis_within_95", "innovations"): np.concatenate(
+            [np.zeros(0), *(log.shown.innovations or ())]
+        ),
     }
+    found: dict[str, Any] = {}
+    for (mean, within, count), values in squared.items():
+        if len(values):
+            found |= {
+                mean: float(values.mean()),
+                within: float((values <= WITHIN).mean()),
+                count: len(values),
+            }
+    return found or None
 
 
 def errors(log: EpisodeLog, *, boxes: Boxes = "amodal", params: ScoringParams) -> list[Floats]:

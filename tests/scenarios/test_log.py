@@ -48,6 +48,7 @@ def shown_of(rng: np.random.Generator, frames: int) -> ShownLog:
         flags=tuple(np.arange(n, dtype=np.int64) for n in rows),
         mask_px=rng.integers(-1, 9, frames),
         object_px=tuple(rng.integers(0, 9, n) for n in rows),
+        innovations=tuple(rng.random(n) for n in rows),
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.types import Detections, Info, Status, Tracks
+from tracker.types import Detections, Diagnostics, Info, Status, Tracks
 
 ACCELERATION, GROWTH, ERROR = 60.0, 20.0, 3.0
 """Noise of the motion, px/s^1.5, and of the sizes, px/s^.5; deviation of a box's centre and size, px."""
@@ -54,6 +54,7 @@ class Jpda:
     def start(self, info: Info) -> None:
         """Make another one."""
         self._ids: dict[str, int] = {}
+        self._innovations = np.zeros(0)
         self._tracker = self._made(info)
 
     def follow(self, detections: Detections) -> Tracks:
@@ -68,6 +69,11 @@ class Jpda:
         order = [(self._ids.get(t.id, len(self._ids) + 1), float(t.state_vector[0]), t) for t in found]
         return self._shown([track for *_, track in sorted(order, key=lambda row: row[:2])])
 
+    @property
+    def diagnostics(self) -> Diagnostics:
+        """The innovations of the tracks that it updated last."""
+        return Diagnostics(innovations=self._innovations)
+
     def _id(self, name: str) -> int:
         return self._ids.setdefault(name, len(self._ids) + 1)
 
@@ -78,6 +84,7 @@ class Jpda:
         centres, half = means[:, [0, 2]], np.maximum(means[:, _SIZE], 1.0) / 2
         update = self._part["types.update"].Update
         seen = np.array([isinstance(t.state, update) for t in found], bool)
+        self._innovations = np.array([_innovation(t.state) for t in found if isinstance(t.state, update)])
         return Tracks(
             ids=np.array([self._id(t.id) for t in found], np.int64),
             boxes=np.hstack([centres - half, centres + half]),
@@ -126,3 +133,13 @@ class Jpda:
             ),
             updater=updater,
         )
+
+
+def _innovation(updated: Any) -> float:
+    """Return how far off a track's likeliest detection lay, squared, in units of the covariance."""
+    single = updated.hypothesis
+    if hasattr(single, "single_hypotheses"):
+        single = max((one for one in single if one), key=lambda one: one.probability)
+    expected = single.measurement_prediction
+    off = np.asarray(single.measurement.state_vector - expected.state_vector, float).ravel()[:2]
+    return float(off @ np.linalg.solve(np.asarray(expected.covar, float)[:2, :2], off))

@@ -10,7 +10,7 @@ from scenarios.score.params import ScoringParams
 from scenarios.score.statistics import over_seeds
 from scenarios.score.strata import EDGES, apparent_speeds, strata
 from scenarios.score.summary import details
-from tests.scenarios.score.episodes import CAR, Car, episode, frame_truth, tracks
+from tests.scenarios.score.episodes import CAR, NOTHING_SHOWN, Car, episode, frame_truth, tracks
 
 PARAMS = ScoringParams()
 NEAR, FAR = (100, 100, 140, 130), (300, 100, 340, 130)
@@ -108,6 +108,13 @@ def test_without_covariances_or_whole_vehicles_there_is_nothing_to_say():
         consistency(episode(cars, [replace(known, boxes=np.array([[300.0, 1, 310, 9]]))]), params=PARAMS)
         is None
     )
+
+
+def test_innovations_are_told_too():
+    cars = [[Car(id=CAR, box=NEAR)]] * 2
+    shown = replace(NOTHING_SHOWN, innovations=(np.array([1.0, 3.0]), np.array([8.0])))
+    log = replace(episode(cars, [tracks((1, NEAR))] * 2), shown=shown)
+    assert consistency(log, params=PARAMS) == {"nis": 4.0, "nis_within_95": 2 / 3, "innovations": 3}
 
 
 def test_normalised_errors_are_those_of_the_inverse():

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.fixtures.make_adapters import PATH, answers, detections
+from tests.fixtures.make_adapters import INFO, PATH, answers, detections
 from tracker.base import check_tracker
 from tracker.registry import DETECTION_TRACKERS, build
 from tracker.types import Status
@@ -17,6 +17,22 @@ STORED = json.loads(PATH.read_text())
 
 def here(name: str) -> bool:
     return importlib.util.find_spec(PACKAGES[name]) is not None
+
+
+def test_jpda_shows_the_innovations_of_its_updates():
+    if not here("stone-soup-jpda"):
+        pytest.skip("stonesoup is not installed")
+    tracker = build("stone-soup-jpda")
+    tracker.start(INFO)
+    shown = []
+    for found in detections():
+        tracks = tracker.follow(found)
+        innovations = tracker.diagnostics.innovations
+        assert len(innovations) == (tracks.status == Status.CONFIRMED).sum()
+        shown += innovations.tolist()
+    # Its noise is set for real boxes, three times what was added to these.
+    assert len(shown) > 60
+    assert 0 < np.mean(shown) < 2
 
 
 @pytest.mark.parametrize("name", DETECTION_TRACKERS)
