@@ -29,7 +29,9 @@ def _needs_gl():
 
 
 def lane(tracker, *overrides: str) -> TrackerInTheLoop:
-    return TrackerInTheLoop(gymnasium.make(LANE, overrides=(*SMALL, *overrides)), tracker)
+    return TrackerInTheLoop(
+        gymnasium.make(LANE, overrides=(*SMALL, "scenery.density=0.1", *overrides)), tracker
+    )
 
 
 def rewards(env: gymnasium.Env, steps: int, *, seed: int = 500) -> list[float]:
