@@ -116,6 +116,10 @@ def run(
     odometry: Annotated[
         bool, typer.Option("--odometry", help="Give the trackers the car's odometry.")
     ] = False,
+    figure: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="PICTURE", help="A PNG or JPEG to show in the reports; once or more."),
+    ] = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
@@ -129,12 +133,21 @@ def run(
     if len(set(names)) < len(names):
         raise InputError(f"--tracker {' --tracker '.join(names)}: wanted each tracker once")
     from scenarios.output import whole_directory
-    from scenarios.runs import Run, execute, make_tracker
+    from scenarios.runs import Run, check_figure, execute, make_tracker
     from scenarios.workers import open_workers
 
     for name in names:
         make_tracker(name, resolved)
-    wanted = Run(scenario=resolved, seeds=chosen, trackers=names, boxes=boxes.value, odometry=odometry)
+    for picture in figure or ():
+        check_figure(picture)
+    wanted = Run(
+        scenario=resolved,
+        seeds=chosen,
+        trackers=names,
+        boxes=boxes.value,
+        odometry=odometry,
+        figures=tuple(figure or ()),
+    )
     place = whole_directory(out) if out else nullcontext()
     with (
         open_workers(min(jobs, len(chosen)), cluster) as workers,
