@@ -83,7 +83,7 @@ class Return:
         distance: The same in standard deviations of the forecast, where covariances were shown.
         before: Patches from before.
         after: Patches since.
-        others: The last patch of each other track that was hidden then, by id.
+        others: The last patch of each other track that was hidden then, by id, the nearest one first.
     """
 
     track: int
@@ -151,11 +151,8 @@ class Flight:
         distance = np.nan
         if covariance is not None:
             distance = float(np.sqrt(apart @ np.linalg.solve(covariance, apart)))
-        others = {
-            other: self._patches[other][-1][1]
-            for other in self._expected
-            if other != track and other in self._patches
-        }
+        hidden = [other for other in self._expected if other != track and other in self._patches]
+        hidden.sort(key=lambda other: float(np.hypot(*(self._expected[other][0] - centre))))
         self.returns.append(
             Return(
                 track=track,
@@ -165,7 +162,7 @@ class Flight:
                 distance=distance,
                 before=[patch for _, patch in known],
                 after=[],
-                others=others,
+                others={other: self._patches[other][-1][1] for other in hidden},
             )
         )
 

@@ -72,7 +72,7 @@ def aerial_tables(runs: Sequence[tuple[str, Mapping[str, Any]]]) -> list[ResultT
             "Re-acquisition",
             "Vehicles that vanish and come back. Correct: under the old id. Wrong: under another vehicle's."
             " By seconds hidden: correct ones of how many.",
-            ("events", "correct", "wrong", "missed", *(f"from {s} s" for s in times)),
+            ("events", "correct", "wrong", "missed", *(f"≥ {s} s" for s in times)),
             [(name, _reacquired(scores)) for name, scores in runs],
         ),
         ResultTable(

@@ -66,14 +66,18 @@ def verdict(each: Return, on: Mapping[int, Mapping[int, int]]) -> str:
 
 def strip(each: Return) -> NDArray[np.uint8]:
     """Draw patches from before and after, and those of the others that were hidden then."""
-    others = sorted(each.others.items())[:OTHERS]
+    others = [*each.others.items()][:OTHERS]
     columns = 2 * PATCHES + OTHERS
     canvas = np.full((_HIGH + 2 * _MARK + 18, columns * (_WIDE + _GAP) + 4 * _GAP, 3), 24, np.uint8)
     colour = rgb(identity(each.track))
     groups = [
         ("before", [(patch, colour) for patch in each.before[-PATCHES:]], PATCHES),
         ("after", [(patch, colour) for patch in each.after], PATCHES),
-        ("others hidden then", [(patch, rgb(identity(track))) for track, patch in others], OTHERS),
+        (
+            "others hidden then, nearest first",
+            [(patch, rgb(identity(track))) for track, patch in others],
+            OTHERS,
+        ),
     ]
     left = _GAP
     for name, patches, room in groups:
