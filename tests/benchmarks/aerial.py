@@ -8,7 +8,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import time
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 
 import cv2
@@ -18,6 +17,7 @@ from scenarios import spec
 from scenarios.bridge import tracker_frame, tracker_info
 from scenarios.loop import make_scene
 from sim.simulation import Simulation
+from tests.benchmarks.lane import cpu_ms
 from tests.benchmarks.lines import Line, table
 from tracker import registry
 from tracker.aerial import lyapunov
@@ -33,13 +33,6 @@ SEED = 0
 REPEATS = 5
 
 Numbers = dict[str, float]
-
-
-def cpu_ms(work: Callable[[], object]) -> float:
-    """Return the milliseconds of this thread's CPU time that ``work`` takes."""
-    began = time.thread_time()
-    work()
-    return 1e3 * (time.thread_time() - began)
 
 
 def searches() -> tuple[float, float]:
