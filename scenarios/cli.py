@@ -119,6 +119,10 @@ def run(
     realtime: Annotated[
         bool, typer.Option("--realtime", help="Drop the frames that come while a tracker is still busy.")
     ] = False,
+    figure: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="PICTURE", help="A PNG or JPEG to show in the reports; once or more."),
+    ] = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
@@ -132,11 +136,13 @@ def run(
     if len(set(names)) < len(names):
         raise InputError(f"--tracker {' --tracker '.join(names)}: wanted each tracker once")
     from scenarios.output import whole_directory
-    from scenarios.runs import Run, execute, make_tracker
+    from scenarios.runs import Run, check_figure, execute, make_tracker
     from scenarios.workers import open_workers
 
     for name in names:
         make_tracker(name, resolved)
+    for picture in figure or ():
+        check_figure(picture)
     wanted = Run(
         scenario=resolved,
         seeds=chosen,
@@ -144,6 +150,7 @@ def run(
         boxes=boxes.value,
         odometry=odometry,
         realtime=realtime,
+        figures=tuple(figure or ()),
     )
     place = whole_directory(out) if out else nullcontext()
     with (

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import cv2
 import numpy as np
 
 from scenarios import manifest as manifests
@@ -48,6 +49,7 @@ class Run:
         odometry: Whether the trackers get the car's noisy odometry.
         realtime: Whether frames that come while a tracker is busy are dropped (`scenarios.realtime`). Tracks
             then depend on the machine, so a manifest leaves them out.
+        figures: Pictures to show in the reports, such as recorded frames beside simulated ones.
     """
 
     scenario: Scenario
@@ -56,6 +58,7 @@ class Run:
     boxes: Boxes = "amodal"
     odometry: bool = False
     realtime: bool = False
+    figures: tuple[Path, ...] = ()
 
     @property
     def frames(self) -> int:
@@ -70,6 +73,20 @@ class Run:
         """Return where one episode of one tracker is kept."""
         folder = self.seed_folder(directory, seed)
         return folder / tracker.replace(":", "-").replace("/", "-") if len(self.trackers) > 1 else folder
+
+
+MEDIA = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg"}
+"""Of the pictures that a report takes, by the end of their names."""
+
+
+def check_figure(path: Path) -> None:
+    """Look whether a picture can go into a report.
+
+    Raises:
+        InputError: If it is no PNG or JPEG.
+    """
+    if path.suffix.lower() not in MEDIA or not path.is_file() or not cv2.haveImageReader(str(path)):
+        raise InputError(f"--figure {path}: wanted a picture, PNG or JPEG")
 
 
 def make_tracker(name: str, scenario: Scenario | None = None, seed: int = 0) -> Tracker:
@@ -229,12 +246,14 @@ def _recorder(run: Run, seed: int, tracker: str, folder: Path) -> Recorder:
 
 def _keep(run: Run, log: EpisodeLog, document: Document, recorder: Recorder) -> None:
     from scenarios.export.mot import write_tracks
+    from scenarios.report.pictures import Picture
 
     folder = recorder.directory
     save(log, folder / "log.npz")
     write_tracks(folder / "tracks.txt", log.tracks)
     write_json(folder / "scores.json", document)
-    recorder.finish(log, document, run.scenario.model_dump(mode="json"))
+    figures = [Picture(path.stem, path.read_bytes(), MEDIA[path.suffix.lower()]) for path in run.figures]
+    recorder.finish(log, document, run.scenario.model_dump(mode="json"), figures=figures)
 
 
 def _document(run: Run, log: EpisodeLog, scores: Document, difficulty: Document) -> Document:

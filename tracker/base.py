@@ -17,8 +17,7 @@ class Tracker(Protocol):
     """Takes the frames of one episode in order and returns the tracks of each.
 
     A tracker without boxes (paper 1's printed rules label traces only) sets ``has_boxes = False`` on its
-    class
-    and returns `Tracks.none()`; its box scores are null.
+    class and returns `Tracks.none()`; its box scores are null.
     """
 
     def start(self, info: Info) -> None:
@@ -55,10 +54,9 @@ class ContractError(ValueError):
 def check_tracker(tracker: object, *, frames: int = 8) -> None:
     """Run the contract of a tracker, of frames or of detections, on small made-up episodes.
 
-    The pictures are noise with moving bright blocks in them: whether a tracker finds these does not matter,
-    what it returns
-    does. A tracker that needs more than it is promised (`tracker.types.Info`, `tracker.types.Frame`) fails
-    here.
+    The pictures are noise with moving bright blocks in them: whether a tracker finds these does not
+    matter, what it returns does. A tracker that needs more than it is promised (`tracker.types.Info`,
+    `tracker.types.Frame`) fails here.
 
     Args:
         tracker: What a user brings.

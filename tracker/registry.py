@@ -10,6 +10,8 @@ TRACKERS = {
     "in-car": "tracker.in_car.tracker:InCarTracker",
     "in-car:paper": "tracker.in_car.paper:PaperTracker",
     "in-car:per-frame": "tracker.in_car.paper:PerFrameTracker",
+    "in-car:sticky": "tracker.in_car.paper:StickyTracker",
+    "in-car:accumulating": "tracker.in_car.paper:AccumulatingTracker",
     "aerial": "tracker.aerial.tracker:AerialTracker",
     "aerial:paper": "tracker.aerial.variants:paper",
     "aerial:motion-only": "tracker.aerial.variants:motion_only",

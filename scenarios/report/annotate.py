@@ -73,6 +73,23 @@ def annotate(
     return canvas
 
 
+def draw_ellipse(
+    canvas: NDArray[np.uint8],
+    centre: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    colour: Rgb,
+    *,
+    deviations: float = 2.0,
+) -> None:
+    """Draw where something is expected: its place (2,), and so many standard deviations of its (2, 2)."""
+    values, vectors = np.linalg.eigh(covariance)
+    axes = tuple(round(deviations * float(np.sqrt(max(value, 0.0)))) for value in values)
+    angle = float(np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])))
+    middle = (round(float(centre[0])), round(float(centre[1])))
+    cv2.ellipse(canvas, middle, (axes[0], axes[1]), angle, 0, 360, colour, 2, cv2.LINE_AA)
+    cv2.circle(canvas, middle, 2, colour, cv2.FILLED, cv2.LINE_AA)
+
+
 def enlarged(image: NDArray[np.uint8], scale: int) -> NDArray[np.uint8]:
     """Return a picture ``scale`` times as wide and high."""
     return np.asarray(cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC), np.uint8)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.report.annotate import annotate, draw_measurements, enlarged
+from scenarios.report.annotate import annotate, draw_ellipse, draw_measurements, enlarged
 from scenarios.report.palette import FOREGROUND, identity, rgb
 from scenarios.report.pictures import Picture, jpeg
 from tracker.types import Association, Diagnostics, Tracks
@@ -158,7 +158,8 @@ def association(moment: Moment) -> tuple[Picture, AssociationTable] | None:
             predictions.ids, predictions.centres, predictions.covariances, strict=True
         ):
             if track in shown.association.ids[rows]:
-                _expected(canvas, int(track), SCALE * centre, SCALE**2 * covariance)
+                colour = rgb(identity(int(track)))
+                draw_ellipse(canvas, SCALE * centre, SCALE**2 * covariance, colour)
     return Picture("Detections and where tracks expected them", jpeg(canvas), "image/jpeg"), table
 
 
@@ -171,17 +172,6 @@ def _rows(association: Association) -> NDArray[np.intp]:
 def _cell(value: float) -> Cell:
     text = "" if value < LEAST_SHOWN else "1" if value > 1.0 - LEAST_SHOWN else f"{value:.2f}"[1:]
     return Cell(value, text)
-
-
-def _expected(canvas: NDArray[np.uint8], track: int, centre: Floats, covariance: Floats) -> None:
-    """Draw where a track expects its rider: the ellipse of two standard deviations."""
-    values, vectors = np.linalg.eigh(covariance)
-    axes = tuple(round(2.0 * float(np.sqrt(max(value, 0.0)))) for value in values)
-    angle = float(np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])))
-    middle = (round(float(centre[0])), round(float(centre[1])))
-    colour = rgb(identity(track))
-    cv2.ellipse(canvas, middle, (axes[0], axes[1]), angle, 0, 360, colour, 2, cv2.LINE_AA)
-    cv2.circle(canvas, middle, 2, colour, cv2.FILLED, cv2.LINE_AA)
 
 
 def _crop(image: NDArray[np.uint8], box: Floats) -> bytes:

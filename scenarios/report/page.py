@@ -13,22 +13,24 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from scenarios.log import EpisodeLog
-from scenarios.report import figures
+from scenarios.report import aerial, figures
+from scenarios.report.flight import Flight
 from scenarios.report.history import History
 from scenarios.report.moment import Moment, association, pictures
 from scenarios.report.palette import DOTS, LABELS, NO_TRACK
 from scenarios.report.pictures import Picture
+from scenarios.report.results import aerial_tables, lane_tables
 from scenarios.report.series import scored_boxes
 from scenarios.report.tables import (
+    AERIAL_SCORES,
     BOX_SCORES,
-    LANE_SCORES,
     MEANINGS,
+    PLAIN_TILES,
     TILE_COUNT,
     TILES,
     Row,
     attribute_notes,
     is_group,
-    lane_tables,
     number,
     parameter_rows,
     plain_rows,
@@ -55,6 +57,7 @@ class Recording:
         film_frames: How many frames are in it.
         stills: Single frames.
         moment: A frame of a lane with what its tracker made of it, or None.
+        flight: Of a tracker that shows a mosaic; empty of others.
         has_traces: Whether the tracker showed traces.
         figures: More pictures to show.
         focal: Px, or None where it is not known.
@@ -69,6 +72,7 @@ class Recording:
     film_frames: int
     stills: tuple[Picture, ...]
     moment: Moment | None
+    flight: Flight
     has_traces: bool
     figures: tuple[Picture, ...]
     focal: float | None
@@ -141,8 +145,15 @@ def write_page(
             facts=plain_rows(_facts(document)) if not values else [],
             difficulty=plain_rows(document.get("difficulty") or {}),
             lane_tables=lane_tables([(document.get("tracker", ""), values)]),
+            aerial_tables=aerial_tables([(document.get("tracker", ""), values)]),
             moment=_moment_pictures(moment, recording, log) if moment is not None else [],
             association=association(moment) if moment is not None else None,
+            flight=aerial.section(
+                recording.flight,
+                log,
+                boxes=document.get("boxes", "amodal"),
+                rate=recording.rate,
+            ),
             riders=drawn.riders,
             profiles=drawn.profiles,
             maps=drawn.maps,
@@ -217,7 +228,8 @@ def _tiles(values: Mapping[str, Any], *, has_boxes: bool, has_traces: bool) -> l
     leaves = dict(values) | dict(values.get("identification") or {})
     leaves |= {f"detection_{name}": value for name, value in (values.get("detection") or {}).items()}
     given = {name: has_boxes if name in BOX_SCORES else has_traces for name in TILES}
-    names = [name for name in TILES if name in leaves and (name in LANE_SCORES or given[name])]
+    leaves |= {f"reacquisition_{name}": value for name, value in (values.get("reacquisition") or {}).items()}
+    names = [name for name in TILES if name in leaves and (name in PLAIN_TILES or given[name])]
     return [
         score_row(name, leaves[name], has_boxes=has_boxes, has_traces=has_traces)
         for name in names[:TILE_COUNT]
@@ -233,7 +245,7 @@ def _tables(values: Mapping[str, Any], *, has_boxes: bool, has_traces: bool) -> 
     plain = {name: value for name, value in values.items() if not is_group(value)}
     tables = [_table("Tracking", [row(name, value) for name, value in plain.items()])] if plain else []
     for name, group in values.items():
-        if not is_group(group):
+        if not is_group(group) or name in AERIAL_SCORES:
             continue
         rows, inner = [], []
         for key, value in group.items():

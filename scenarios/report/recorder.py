@@ -15,6 +15,7 @@ from scenarios.files import moved_in
 from scenarios.log import EpisodeLog
 from scenarios.report.annotate import STRIP, annotate
 from scenarios.report.film import Film
+from scenarios.report.flight import Flight
 from scenarios.report.history import History, Thinned
 from scenarios.report.moment import SCALE, MomentChooser
 from scenarios.report.page import Recording, write_page
@@ -24,7 +25,9 @@ from sim.truth.types import FrameTruth
 from tracker.types import Diagnostics, Tracks
 
 FILM_SECONDS = 180.0
-"""A longer run is filmed to here only: the video goes into the page, and a page has to open."""
+"""A longer run is filmed to here only: the video goes into the page, and a page has to open.
+
+A flight is mapped to here only, too."""
 STILLS = 6
 """Frames shown beneath the video."""
 
@@ -55,10 +58,11 @@ class Recorder:
         self.height = height
         self.rate = rate
         self.title = title
-        lane = scene == "motorcycle-lane"
-        self._scale, self._strip = (SCALE, 0) if lane else (1, STRIP)
+        traced = scene == "in-car"
+        self._scale, self._strip = (1, STRIP) if traced else (SCALE, 0)
         self._moments = MomentChooser()
-        self._has_traces = not lane
+        self._flight = Flight()
+        self._has_traces = traced
         self._frames = 0
         self._history = History()
         self._stills = Thinned(2 * STILLS)
@@ -107,6 +111,8 @@ class Recorder:
 
         filmed = index < FILM_SECONDS * self.rate
         kept = self._stills.wants(index)
+        if filmed:
+            self._flight.add(index, image, tracks, diagnostics)
         if not filmed and not kept:
             return
         time = index / self.rate
@@ -160,6 +166,7 @@ class Recorder:
             film_frames=self._film.frames,
             stills=tuple(self._kept[int(k)] for k in choice) if self._kept else (),
             moment=self._moments.chosen,
+            flight=self._flight,
             has_traces=self._has_traces,
             figures=tuple(figures),
             focal=focal,

@@ -12,10 +12,22 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from scenarios.files import moved_in
-from scenarios.report import plots
+from scenarios.report import hidden, plots
 from scenarios.report.page import confusion, environment
 from scenarios.report.palette import SERIES
-from scenarios.report.tables import DASH, FRACTIONS, MEANINGS, flat, lane_tables, number, words
+from scenarios.report.results import aerial_tables, lane_tables
+from scenarios.report.tables import (
+    AERIAL_SCORES,
+    DASH,
+    FRACTIONS,
+    MEANINGS,
+    flat,
+    number,
+    words,
+)
+
+_LOWER = ("id_switches", "median_seconds_to_identify", "never_identified", "oncoming_as_car", "wrong")
+"""Scores of which less is better, beside the prediction errors."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +84,14 @@ def write_summary(
             trackers=list(zip(trackers, (SERIES * len(trackers))[: len(trackers)], strict=True)),
             chart=_chart(trackers, scores),
             lane_tables=lane_tables([(str(run["tracker"]), run["scores"]) for run in runs]),
+            aerial_tables=aerial_tables([(str(run["tracker"]), run["scores"]) for run in runs]),
+            by_hidden_time=hidden.by_hidden_time(
+                {
+                    name: run["scores"]["reacquisition_by_hidden_s"]
+                    for name, run in zip(trackers, runs, strict=True)
+                    if "reacquisition_by_hidden_s" in run["scores"]
+                }
+            ),
             lines=_lines(scores, len(seeds)),
             paired=[
                 {
@@ -107,7 +127,11 @@ def _link(directory: Path, report: Path | None) -> str:
 
 
 def _lines(scores: Sequence[Mapping[tuple[str, ...], Any]], seeds: int) -> list[_Line]:
-    keys = [key for key in dict.fromkeys(key for run in scores for key in run) if "confusion" not in key]
+    keys = [
+        key
+        for key in dict.fromkeys(key for run in scores for key in run)
+        if "confusion" not in key and key[0] not in AERIAL_SCORES
+    ]
     return [
         _Line(_name(key), MEANINGS.get(key[-1], ""), [_cell(run.get(key), seeds) for run in scores])
         for key in keys
@@ -129,12 +153,12 @@ def _differences(difference: Mapping[str, Any], seeds: int) -> list[_Line]:
 
 
 def _lower_is_better(key: tuple[str, ...]) -> bool:
-    return key[-1] in ("id_switches", "median_seconds_to_identify", "never_identified", "oncoming_as_car")
+    return "prediction" in key[0] or key[-1] in _LOWER
 
 
 def _neutral(key: tuple[str, ...]) -> bool:
     """Say whether more is neither better nor worse."""
-    return "traces_per_10s" in key
+    return key[0] in ("predicted_events", "prediction_inside") or "traces_per_10s" in key
 
 
 def _name(key: tuple[str, ...]) -> str:

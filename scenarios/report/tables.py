@@ -37,6 +37,9 @@ MEANINGS = {
     "false": "detections on no rider; tracks flagged that are on no such rider",
     "absorbed_s": "from a rider's standstill until it has left the mask",
     "recovery_s": "from a sudden change of light until the mask is calm again",
+    "reacquisition_correct": "vehicles that vanished and came back under their old id",
+    "reacquisition_wrong": "that came back under another vehicle's",
+    "reacquisition_missed": "that came back under a new one, or under none",
     "moving": "traces during which the camera car went 10 m or more",
 }
 """What each score says, in a line."""
@@ -48,6 +51,9 @@ TILES = (
     "detection_precision",
     "detection_recall",
     "detection_foreground_f",
+    "reacquisition_correct",
+    "reacquisition_wrong",
+    "reacquisition_missed",
     "car_recall",
     "background_recall",
     "median_seconds_to_identify",
@@ -64,6 +70,14 @@ LANE_SCORES = (
     *("foreground_f", "riders", "correct", "missed", "total", "lost", "present", "flagged", "false"),
     *("absorbed_s", "recovery_s"),
 )
+PLAIN_TILES = (*LANE_SCORES, "reacquisition_correct", "reacquisition_wrong", "reacquisition_missed")
+"""Tiles that need neither traces nor a share of 1."""
+AERIAL_SCORES = (
+    *("reacquisition", "reacquisition_by_hidden_s", "predicted_events", "prediction_inside"),
+    *("prediction_error_px", "prediction_variance_px2", "prediction_error_at_px"),
+    *("linear_prediction_error_px", "kalman_prediction_error_px"),
+)
+"""Groups of scores that stand in tables of their own."""
 _TRACES = ("car_recall", "background_recall", "accuracy", "balanced_accuracy", "vehicle_coverage")
 _DETECTION = ("foreground_f", "detection_precision", "detection_recall", "detection_foreground_f")
 FRACTIONS = frozenset((*BOX_SCORES, *_TRACES, *_DETECTION)) - {"id_switches"}
@@ -194,58 +208,6 @@ def parameter_rows(values: Mapping[str, Any], notes: Mapping[str, str] | None = 
         )
         for name, value in values.items()
     ]
-
-
-@dataclass(frozen=True, slots=True)
-class LaneTable:
-    """A table with a row for each tracker, as the paper prints its results."""
-
-    title: str
-    note: str
-    columns: tuple[str, ...]
-    rows: list[tuple[str, list[str]]]
-
-
-def lane_tables(runs: Sequence[tuple[str, Mapping[str, Any]]]) -> list[LaneTable]:
-    """Return detections and full tracks as in the paper's tables II and III.
-
-    Args:
-        runs: Name and scores of each tracker; no tables come of scores that are no lane's.
-    """
-    if not runs or not all("full_tracks" in scores for _, scores in runs):
-        return []
-    detections = [(name, scores["detection"]) for name, scores in runs]
-    followed = [(name, scores["full_tracks"]) for name, scores in runs]
-    return [
-        LaneTable(
-            "Detections",
-            "Riders and detections of all scored frames, matched one to one.",
-            ("true riders", "correctly detected", "false", "missed", "precision", "recall"),
-            [
-                (name, [number(d.get(key)) for key in ("riders", "correct", "false", "missed")] + shares(d))
-                for name, d in detections
-            ],
-        ),
-        LaneTable(
-            "Full tracks",
-            "Full: one id all the way. Lost: no one id for a fifth of the way. Partial: between the two.",
-            ("riders", "full", "partial", "lost", "share full"),
-            [(name, _followed(t)) for name, t in followed],
-        ),
-    ]
-
-
-def shares(detection: Mapping[str, Any]) -> list[str]:
-    """Print precision and recall."""
-    return [number(detection.get("precision")), number(detection.get("recall"))]
-
-
-def _followed(tracks: Mapping[str, Any]) -> list[str]:
-    total, full, lost = (tracks.get(key) for key in ("total", "correct", "lost"))
-    if total is None or full is None or lost is None:
-        return [DASH] * 5
-    share = full / total if total else None
-    return [number(value) for value in (total, full, total - full - lost, lost, share)]
 
 
 def attribute_notes(documented: type) -> dict[str, str]:

@@ -14,6 +14,7 @@ from scenarios.score.identification import identification, judge_traces
 from scenarios.score.identity import identity
 from scenarios.score.lane import lane_scores
 from scenarios.score.params import Boxes, ScoringParams
+from scenarios.score.prediction import prediction
 from scenarios.score.reacquisition import reacquisition
 from scenarios.score.strata import strata
 
@@ -38,7 +39,10 @@ def score(
     if log.scene == "motorcycle-lane":
         special = lane_scores(log, boxes=boxes, params=params)
     elif log.scene == "aerial":
-        special = {"reacquisition": reacquisition(log, boxes=boxes, params=params)}
+        special = {
+            "reacquisition": reacquisition(log, boxes=boxes, params=params),
+            **prediction(log, boxes=boxes, params=params),
+        }
     else:
         special = {"identification": identification(log, traces, boxes=boxes, params=params)}
     scores = box_scores(log, boxes=boxes, params=params) | special

@@ -29,7 +29,8 @@ RAMP = 75.0
 BATTER = 1.6
 """Metres that an embankment's sides run out for each metre that they rise."""
 _STRIPE = 0.16
-_TURF = 1.6
+_TURF = 14.0
+"""Metres of a slope that the grass covers before it repeats: tiles of a few pixels would show as a grid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,7 +155,6 @@ def _embankments(builder: MeshBuilder, bridge: Overpass) -> None:
             slope = np.array(
                 [(near, sign * side, top), (far, sign * side, 0.0), (near, sign * (side + foot), 0.0)]
             )
-            # Repeated so densely, the texture is an even green from afar.
             builder.polygon(slope, Surface.GRASS, facing=(0, sign, 1), uv=slope[:, :2] / _TURF)
         wall = [(near, -side, 0), (near, side, 0), (near, side, top), (near, -side, top)]
         builder.polygon(wall, Surface.CONCRETE, facing=(-end, 0, 0))

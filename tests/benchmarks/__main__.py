@@ -2,13 +2,13 @@
 
 import os
 
-from tests.benchmarks import datasets, episode, jpda, lane, render, tracker, traffic
+from tests.benchmarks import aerial, datasets, episode, jpda, lane, render, tracker, traffic
 from tests.benchmarks.lines import table
 
 if __name__ == "__main__":
     lines = []
     before = os.getloadavg()[0]
-    for benchmark in (traffic, render, tracker, episode, lane, jpda, datasets):
+    for benchmark in (traffic, render, tracker, episode, lane, aerial, jpda, datasets):
         print(f"\n## {benchmark.__name__.rsplit('.', 1)[-1]}", flush=True)
         lines += benchmark.main()
     print(f"\n## all\n{table(lines)}")

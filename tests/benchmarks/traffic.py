@@ -74,8 +74,8 @@ def measure(count: int) -> tuple[float, float]:
     from highway_env.road.road import Road
     from highway_env.vehicle.behavior import IDMVehicle
 
-    from sim.drivers import QuickVehicle
     from sim.indexed_road import IndexedRoad
+    from sim.quick_vehicle import QuickVehicle
 
     road = build_road(RoadParams(curved=True), 2000.0, stream(0, "road"))
     worlds = []

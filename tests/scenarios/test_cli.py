@@ -73,6 +73,8 @@ BAD = {
         *("run", "lane-day", "--tracker", "tests.scenarios.fakes:SilentTracker"),
         *("--cluster", "no address"),
     ),
+    "a figure that is no picture": ("run", "in-car-day", "--figure", "{tmp}/text.mp4", "--out", "{out}"),
+    "a figure of text": ("run", "in-car-day", "--figure", "{tmp}/text.png", "--out", "{out}"),
     "nowhere to generate": ("generate", "in-car-day"),
     "generate an unknown scenario": ("generate", "in-car-dya", "--out", "{out}"),
     "generate a misspelt key": ("generate", "in-car-day", "--set", "sensor.nois=3", "--out", "{out}"),
@@ -116,7 +118,8 @@ def inputs(tmp_path_factory):
     (folder / "misspelt.toml").write_text('scene = "in-car"\n[sensor]\nnois = 3\n')
     (folder / "nan.toml").write_text('scene = "in-car"\n[sensor]\nnoise = nan\n')
     (folder / "negative.toml").write_text('scene = "in-car"\n[camera]\nwidth = -640\n')
-    (folder / "text.mp4").write_text("not a video\n" * 50)
+    for name in ("text.mp4", "text.png"):
+        (folder / name).write_text("not a video\n" * 50)
     scenario = spec.load("in-car-day").model_dump(mode="json")
     whole = {"format": manifest.FORMAT, "scenario": scenario, "trackers": [], "odometry": False}
     whole |= {"environment": {}, "episodes": []}

@@ -9,7 +9,7 @@ import pytest
 from scenarios.log import EpisodeLog, TraceLog, load, save
 from scenarios.shown import ShownLog
 from sim.truth.types import AerialTruth, FrameTruth
-from tracker.types import Tracks
+from tracker.types import Predictions, Tracks
 
 
 def truth(rng: np.random.Generator, tick: int, n: int) -> FrameTruth:
@@ -49,6 +49,15 @@ def shown_of(rng: np.random.Generator, frames: int) -> ShownLog:
         mask_px=rng.integers(-1, 9, frames),
         object_px=tuple(rng.integers(0, 9, n) for n in rows),
         innovations=tuple(rng.random(n) for n in rows),
+        predictions=tuple(
+            Predictions(
+                ids=np.arange(n, dtype=np.int64),
+                centres=rng.random((n, 2)),
+                covariances=rng.random((n, 2, 2)),
+            )
+            for n in rows
+        ),
+        homographies=rng.random((frames, 3, 3)),
     )
 
 

@@ -7,8 +7,9 @@ import pytest
 
 from scenarios.report.moment import TRAINED, Moment, MomentChooser, association, doubt, pictures
 from scenarios.report.recorder import Recorder
+from scenarios.report.results import lane_tables
 from scenarios.report.series import follow_riders, foreground_series, measure
-from scenarios.report.tables import DASH, lane_tables
+from scenarios.report.tables import DASH
 from scenarios.score.params import ScoringParams
 from scenarios.shown import NO_MASK, ShownLog
 from tests.scenarios.score.episodes import CAR, Car, episode, tracks

@@ -1,5 +1,6 @@
 """The whole command on the real simulation, on half a second of a drive."""
 
+import base64
 import json
 import os
 import signal
@@ -7,6 +8,8 @@ import subprocess
 import sys
 import time
 
+import cv2
+import numpy as np
 import pytest
 
 from scenarios import runs, spec
@@ -90,7 +93,14 @@ def test_results_do_not_depend_on_the_jobs():
 
 
 def test_an_episode_is_kept_whole(tmp_path):
-    run = Run(scenario=spec.load("in-car-day", ["seconds=0.1"]), seeds=range(3, 5), trackers=(SILENT, MIDDLE))
+    picture = tmp_path / "beside a recording.png"
+    picture.write_bytes(cv2.imencode(".png", np.zeros((4, 6, 3), np.uint8))[1])
+    run = Run(
+        scenario=spec.load("in-car-day", ["seconds=0.1"]),
+        seeds=range(3, 5),
+        trackers=(SILENT, MIDDLE),
+        figures=(picture,),
+    )
     documents = runs.run_seed(run, tmp_path, 4)
     folder = tmp_path / "seed-4" / "tests.scenarios.test_cli-MiddleTracker"
     assert {entry.name for entry in folder.iterdir()} == {
@@ -103,6 +113,9 @@ def test_an_episode_is_kept_whole(tmp_path):
     log = load(folder / "log.npz")
     assert (log.seed, log.tracker, len(log.tracks)) == (4, MIDDLE, 3)
     assert log.hashes == documents[MIDDLE]["hashes"]
+    page = (folder / "report.html").read_text("utf-8")
+    assert picture.stem in page
+    assert base64.b64encode(picture.read_bytes()).decode() in page
 
 
 def test_an_interrupt_ends_with_130_and_leaves_nothing(tmp_path):

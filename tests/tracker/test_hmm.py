@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.special import expit
+from scipy.special import expit, logit
 
 from tracker.in_car.hmm import (
     PAPER,
@@ -94,7 +94,7 @@ def test_sticky_needs_repeated_evidence():
 def test_evidence_of_independent_frames_is_bayes_rule():
     evidence = Evidence(correlation_time=0.1)
     ratios = np.array([0.3, -1.0, 2.0])
-    log_odds = np.array([Evidence.start(0.2)])
+    log_odds = np.array([logit(0.2)])
     for ratio in ratios:
         log_odds = evidence.update(log_odds, [ratio], dt=0.1)
     prior = 0.2 / 0.8

@@ -6,6 +6,7 @@ from scipy.integrate import quad
 
 from tracker.in_car.likelihood import MotionPriors
 from tracker.in_car.occurrence import Occurrence
+from tracker.in_car.profile import band_rows
 
 FOCAL = 800.0
 X_EDGES, Y_EDGES = np.linspace(-320, 320, 65), np.linspace(-60, 180, 49)
@@ -86,6 +87,16 @@ def test_band_is_a_small_part_of_the_picture():
     """The paper's reason to profile vertically: nine tenths of a car's features within 70 of 480 rows."""
     low, high = Occurrence(FOCAL).useful_band(0.9)
     assert -20 < low < 0 < high < 80
+
+
+@pytest.mark.parametrize("focal", [560.0, 640.0, 800.0])
+@pytest.mark.parametrize("vehicle_height", [1.5, 2.6])
+def test_the_front_end_looks_where_vehicles_show(focal, vehicle_height):
+    """Its band holds the one that nine tenths of the features of cars and of vans lie in."""
+    top, bottom = band_rows(240.0, 480, 640)
+    low, high = Occurrence(focal, vehicle_height=vehicle_height).useful_band(0.9)
+    assert top <= 240 + low
+    assert 240 + high <= bottom
 
 
 def test_bad_arguments():

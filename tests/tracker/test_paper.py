@@ -5,7 +5,13 @@ import numpy as np
 import pytest
 
 from tracker.base import Diagnosable, Tracker
-from tracker.in_car.paper import MINIMUM_DURATION, PaperTracker, PerFrameTracker
+from tracker.in_car.paper import (
+    MINIMUM_DURATION,
+    AccumulatingTracker,
+    PaperTracker,
+    PerFrameTracker,
+    StickyTracker,
+)
 from tracker.types import Frame, Info, Intrinsics, Label
 
 FOCAL, WIDTH, HEIGHT, RATE, SPEED = 800.0, 640, 480, 30, 20.0
@@ -79,8 +85,9 @@ def on_board(x):
     return np.ptp(x) > 40
 
 
-def test_paper_labels_cars_and_boards(frames):
-    results = run(PaperTracker(), frames)
+@pytest.mark.parametrize("kind", [PaperTracker, StickyTracker, AccumulatingTracker])
+def test_cars_and_boards_are_labelled(kind, frames):
+    results = run(kind(), frames)
     cars, boards = final_labels(results, on_car), final_labels(results, on_board)
     assert len(cars) >= 1
     assert len(boards) >= 3
@@ -111,7 +118,22 @@ def test_per_frame_has_no_memory(frames):
     np.testing.assert_allclose(sorted(last.p_car), sorted(shifted.p_car), atol=0.1)
 
 
-@pytest.mark.parametrize("kind", [PaperTracker, PerFrameTracker])
+def test_memory_changes_its_mind_less_often(frames):
+    """Methods.md 1.6: without memory labels flicker."""
+
+    def changes(kind):
+        last, count = {}, 0
+        for traces in run(kind(), frames):
+            for trace, label in zip(traces.ids, traces.labels, strict=True):
+                count += last.get(trace, label) != label != Label.UNDECIDED != last.get(trace)
+                last[trace] = label
+        return count
+
+    per_frame, paper, accumulating = map(changes, (PerFrameTracker, PaperTracker, AccumulatingTracker))
+    assert accumulating <= paper < per_frame
+
+
+@pytest.mark.parametrize("kind", [PaperTracker, PerFrameTracker, StickyTracker, AccumulatingTracker])
 def test_contract(kind, frames):
     tracker = kind()
     assert isinstance(tracker, Tracker)

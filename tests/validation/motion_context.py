@@ -3,28 +3,27 @@
 ``python -m tests.validation.motion_context [--recorded DIR]`` prints MPE_n and its variance (methods.md 2.6)
 of the motion context and of straight continuation by a line and by a Kalman filter, on traffic that the
 simulator drives on straight and on winding roads, and on recorded traffic where that is at hand; and how much
-of the truth lies inside the predicted 50 % and 95 % ellipses. Positions are seen from above with noise; other
-vehicles are seen all the time, as far as they are not being hidden themselves.
+of the truth lies inside the predicted ellipses of 50 and 95 %. Positions are seen from above with noise;
+other vehicles are seen all the time, as far as they are not being hidden themselves.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
-from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim import meshes
 from sim.params import EgoParams, RoadParams, TrafficParams
+from sim.recorded import read, resample
 from sim.rng import stream
 from sim.roads import build_road
 from sim.traffic import Traffic
-from tracker.aerial.calibration import Calibration, quantile
+from tracker.aerial.calibration import SHARES, Calibration, quantile
 from tracker.aerial.forecasts import WINDOW, Forecast, Forecaster, KalmanForecast, LinearForecast
 from tracker.aerial.motion_context import PRINTED, ContextForecast
 from tracker.aerial.trajectories import Trajectories
@@ -48,23 +47,34 @@ FORECASTERS: dict[str, Forecaster] = {
     "Kalman": KalmanForecast,
 }
 
+RECORDINGS = {
+    "drone": "geotrax/vehicles.csv",
+    "US-101": "commonroad/USA_US101-4_1_T-1.xml",
+    "Lankershim": "commonroad/USA_Lanker-1_1_T-1.xml",
+}
+"""Files of the folder with recorded traffic: 5, 10 and 4 seconds."""
+REPEATS = 8
+"""Times that a recording is gone through, other vehicles hidden each time: it is short."""
+
 Ways = Mapping[int, tuple[int, Floats]]
 """Of each vehicle the first tick, and its positions from then on, (K, 2) px."""
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One vehicle hidden: whether its way turned, and of each frame the truth inside the ellipses' measure.
+    """One vehicle hidden for n frames.
 
     Attributes:
-        curved: Whether it turned.
-        errors: (n,) distances, px, of each forecast.
-        measures: (n,) squared Mahalanobis distances likewise.
+        curved: Whether its way turned.
+        errors: (n,) distances, px, of the truth from each forecast.
+        inside: (n, 2) whether the truth lies inside the forecast's ellipses of 50 and 95 %.
+        predictors: Mean number of predictors that the motion context had.
     """
 
     curved: bool
     errors: dict[str, Floats]
-    measures: dict[str, Floats]
+    inside: dict[str, NDArray[np.bool_]]
+    predictors: float
 
 
 def simulated(seed: int, *, curved: bool, seconds: float = 40.0) -> Ways:
@@ -74,8 +84,6 @@ def simulated(seed: int, *, curved: bool, seconds: float = 40.0) -> Ways:
     drivers = TrafficParams(
         density=18.0, oncoming_density=14.0, speed=13.0 if curved else 20.0, vans=0, lorries=0, buses=0
     )
-    from sim import meshes
-
     traffic = Traffic(road, drivers, EgoParams(speed=drivers.speed), meshes.catalogue(), seed=seed, rate=RATE)
     ways: dict[int, tuple[int, list[Floats]]] = {}
     for tick in range(round(seconds * RATE)):
@@ -88,37 +96,15 @@ def simulated(seed: int, *, curved: bool, seconds: float = 40.0) -> Ways:
     return {vehicle: (begin, np.array(way)) for vehicle, (begin, way) in ways.items()}
 
 
-def drone(path: Path) -> Ways:
-    """Read geo-trax's vehicles: positions in metres, 30 a second."""
-    rows: dict[int, list[tuple[int, float, float]]] = defaultdict(list)
-    with path.open() as file:
-        for row in csv.DictReader(file):
-            rows[int(row["Vehicle_ID"])].append(
-                (int(row["Frame_Number"]), float(row["Local_X"]), float(row["Local_Y"]))
-            )
-    return {vehicle: _even(np.array(way), 1.0) for vehicle, way in rows.items()}
-
-
-def commonroad(path: Path) -> Ways:
-    """Read the recorded vehicles of a CommonRoad scenario: ten positions a second, three frames each."""
+def recorded(path: Path) -> Ways:
+    """Read a recording's vehicles, as they would be seen from above."""
+    recording = read(path)
+    sampled = resample(recording, RATE, start=0.0, ticks=int(recording.seconds * RATE) + 1)
     ways = {}
-    for vehicle in ElementTree.parse(path).getroot().iter("dynamicObstacle"):
-        rows = []
-        states = [vehicle.find("initialState"), *vehicle.iter("state")]
-        for state in (state for state in states if state is not None):
-            tick, x, y = (state.findtext(at) for at in ("time/exact", ".//point/x", ".//point/y"))
-            if tick is not None and x is not None and y is not None:
-                rows.append((float(tick), float(x), float(y)))
-        ways[int(vehicle.attrib["id"])] = _even(np.array(rows), RATE / 10)
+    for k in np.flatnonzero(sampled.present.any(0)).tolist():
+        ticks = np.flatnonzero(sampled.present[:, k])
+        ways[k] = (int(ticks[0]), SCALE * sampled.positions[ticks, k] * [1.0, -1.0])
     return ways
-
-
-def _even(rows: Floats, frames: float) -> tuple[int, Floats]:
-    """Turn rows of time step, x, y (metres) into the first tick and a position (px) for every tick."""
-    ticks = np.round(rows[:, 0] * frames)
-    all_ticks = np.arange(ticks[0], ticks[-1] + 1)
-    way = np.stack([np.interp(all_ticks, ticks, SCALE * rows[:, k]) for k in (1, 2)], 1)
-    return int(ticks[0]), way
 
 
 def hide(ways: Ways, *, seed: int = 0, frames: int = max(LEADS)) -> list[Event]:
@@ -128,6 +114,7 @@ def hide(ways: Ways, *, seed: int = 0, frames: int = max(LEADS)) -> list[Event]:
     seen = {vehicle: way + rng.normal(0.0, NOISE, way.shape) for vehicle, (_, way) in ways.items()}
     known, hidden, events = Trajectories(), dict[int, tuple[int, dict[str, list[Floats]]]](), []
     models: dict[int, dict[str, Forecast]] = {}
+    guides: dict[int, list[int]] = {}
     calibrations = {name: Calibration(make) for name, make in FORECASTERS.items()}
     for tick in range(last):
         here = [v for v, (begin, way) in ways.items() if begin <= tick < begin + len(way)]
@@ -140,11 +127,13 @@ def hide(ways: Ways, *, seed: int = 0, frames: int = max(LEADS)) -> list[Event]:
             for name, forecast in models[vehicle].items():
                 forecast.step(tick)
                 apart = truth - forecast.point
-                covariance = calibrations[name].scale(tick - since) * forecast.covariance
-                measure = float(apart @ np.linalg.solve(covariance, apart))
-                found[name].append(np.array([np.hypot(*apart), measure]))
+                measure = float(apart @ np.linalg.solve(forecast.covariance, apart))
+                limits = calibrations[name].scale(tick - since) * quantile(SHARES)
+                found[name].append(np.array([np.hypot(*apart), *(measure <= limits)]))
+            guides[vehicle].append(len(models[vehicle]["context"].guides))
             if tick == since + frames:
-                events.append(_event(way[since - begin : tick - begin + 1], found))
+                turned = _turns(way[since - begin : tick - begin + 1])
+                events.append(_event(turned, found, float(np.mean(guides.pop(vehicle)))))
                 del hidden[vehicle]
         moving = [v for v in here if v not in hidden and _moves(known, v, tick)]
         for calibration in calibrations.values():
@@ -155,6 +144,7 @@ def hide(ways: Ways, *, seed: int = 0, frames: int = max(LEADS)) -> list[Event]:
                 chosen = int(rng.choice(ready))
                 models[chosen] = {name: make(known, chosen) for name, make in FORECASTERS.items()}
                 hidden[chosen] = (tick, {name: [] for name in FORECASTERS})
+                guides[chosen] = []
     return events
 
 
@@ -166,14 +156,21 @@ def _moves(known: Trajectories, vehicle: int, tick: int) -> bool:
     return bool(np.hypot(*np.diff(known.at(vehicle, [tick - WINDOW, tick]), axis=0)[0]) > 10.0)
 
 
-def _event(way: Floats, found: Mapping[str, list[Floats]]) -> Event:
+def _turns(way: Floats) -> bool:
+    """Tell whether a way (K, 2) turns by more than `TURNED`."""
     steps = way[5::5] - way[:-5:5]
     moving = steps[np.hypot(*steps.T) > 2.0]
     headings = np.unwrap(np.arctan2(moving[:, 1], moving[:, 0]))
-    curved = len(headings) > 1 and float(np.ptp(headings)) > TURNED
+    return len(headings) > 1 and float(np.ptp(headings)) > TURNED
+
+
+def _event(curved: bool, found: Mapping[str, list[Floats]], predictors: float) -> Event:
     values = {name: np.array(rows) for name, rows in found.items()}
     return Event(
-        curved, {name: v[:, 0] for name, v in values.items()}, {name: v[:, 1] for name, v in values.items()}
+        curved,
+        {name: rows[:, 0] for name, rows in values.items()},
+        {name: rows[:, 1:] > 0 for name, rows in values.items()},
+        predictors,
     )
 
 
@@ -183,42 +180,40 @@ def mean_errors(events: list[Event], name: str, lead: int) -> tuple[float, float
     return float(parts.mean()), float(parts.var(axis=1).mean())
 
 
-def coverage(events: list[Event], name: str, share: float) -> float:
-    """Return the share of frames whose truth lies inside the ellipse of ``share``."""
-    return float(np.mean([np.mean(event.measures[name] <= quantile(share)) for event in events]))
+def coverage(events: list[Event], name: str) -> Floats:
+    """Return (2,) shares of frames whose truth lies inside, see `Event.inside`."""
+    return np.asarray(np.concatenate([event.inside[name] for event in events]).mean(0))
 
 
 def report(title: str, events: list[Event]) -> str:
     """Return the table of one kind of traffic."""
     if not events:
         return f"{title}: no events\n"
-    lines = [f"{title}: {len(events)} events"]
+    predictors = np.mean([event.predictors for event in events])
+    lines = [f"{title}: {len(events)} events, {predictors:.1f} predictors in the mean"]
     head = "".join(f"{f'MPE_{n} px':>11s}{f'var_{n} px2':>12s}" for n in LEADS)
     lines.append(f"  {'forecast':12s}{head}{'in 50 %':>9s}{'in 95 %':>9s}")
     for name in FORECASTERS:
         cells = "".join(f"{m:11.2f}{v:12.2f}" for m, v in (mean_errors(events, name, n) for n in LEADS))
-        lines.append(
-            f"  {name:12s}{cells}{coverage(events, name, 0.5):9.2f}{coverage(events, name, 0.95):9.2f}"
-        )
+        half, most = coverage(events, name)
+        lines.append(f"  {name:12s}{cells}{half:9.2f}{most:9.2f}")
     return "\n".join(lines) + "\n"
 
 
-def run(seeds: range, recorded: Path | None = None) -> dict[str, list[Event]]:
+def run(seeds: range, folder: Path | None = None) -> dict[str, list[Event]]:
     """Return the events by kind of traffic."""
     found: dict[str, list[Event]] = {"straight": [], "curved": []}
     for seed in seeds:
         for curved in (False, True):
             for event in hide(simulated(seed, curved=curved), seed=seed):
                 found["curved" if event.curved else "straight"].append(event)
-    if recorded is not None:
-        readers: tuple[tuple[str, str, Callable[[Path], Ways]], ...] = (
-            ("drone", "geotrax/vehicles.csv", drone),
-            ("US-101", "commonroad/USA_US101-4_1_T-1.xml", commonroad),
-        )
-        for name, path, read in readers:
-            for event in hide(read(recorded / path), seed=seeds[0]):
-                kind = f"{name}, {'curved' if event.curved else 'straight'}"
-                found.setdefault(kind, []).append(event)
+    if folder is not None:
+        for name, path in RECORDINGS.items():
+            ways = recorded(folder / path)
+            for repeat in range(REPEATS):
+                for event in hide(ways, seed=seeds[0] + repeat):
+                    kind = f"{name}, {'curved' if event.curved else 'straight'}"
+                    found.setdefault(kind, []).append(event)
     return found
 
 

@@ -2,7 +2,8 @@
 
 ``python -m tests.validation.realism`` prints medians and quartiles of what the in-car tracker's detector
 finds in one frame, and whether the scenario's median lies within a factor of two of the recordings'.
-``--sheet FILE.png`` writes frames of both, one above the other; ``--frames N`` says how many of each side.
+``--sheet FILE.png`` writes frames of both, one above the other, which ``testtrack run ... --figure FILE.png``
+shows in its report; ``--frames N`` says how many of each side.
 
 All frames are brought to 640 x 360: recordings are resized, of the scenario's 640 x 480 the middle is taken.
 """
@@ -180,19 +181,6 @@ def strip(title: str, real: list[Image], synthetic: list[Image], columns: int = 
 def png(image: Image) -> bytes:
     """Encode RGB as PNG."""
     return bytes(cv2.imencode(".png", image[..., ::-1])[1])
-
-
-def sheets(frames: int = 6) -> dict[str, bytes]:
-    """Return recorded frames above simulated ones as PNG, one picture a scenario whose recordings are there.
-
-    Args:
-        frames: Of each side.
-    """
-    return {
-        name: png(strip(name, recordings(clips, frames), list(simulated(name, frames)), frames))
-        for name, clips, _ in PAIRS
-        if all((RECORDINGS / clip).is_file() for clip in clips)
-    }
 
 
 def compare(real: list[Image], synthetic: list[Image]) -> list[str]:

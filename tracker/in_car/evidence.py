@@ -1,12 +1,10 @@
 """How much a point's motion speaks for a vehicle that goes the ego's way: log likelihood ratios.
 
 What is static and seen y px below the horizon lies on the ground or above it, so it is at most ``f H / y``
-away and expands
-at least at ``e = g y``. A vehicle that drives along expands at ``u / Z`` with u the small closing speed. An
-oncoming one expands
-faster than the ground, so it counts with the scenery here. This is p(x, v | B) and p(x, v | C) of paper 1
-with the row of
-the point put in place of the unknown depth, and both axes of the flow in place of one.
+away and expands at least at ``e = g y``. A vehicle that drives along expands at ``u / Z`` with u the small
+closing speed. An oncoming one expands faster than the ground, so it counts with the scenery here. This is
+p(x, v | B) and p(x, v | C) of paper 1 with the row of the point put in place of the unknown depth, and both
+axes of the flow in place of one.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import expit, logit
+from scipy.special import expit
 
 Floats = NDArray[np.float64]
 
@@ -129,7 +129,7 @@ class Evidence:
         """Advance the log odds of N traces by a frame.
 
         Args:
-            log_odds: (N,) before; `start` for new traces.
+            log_odds: (N,) before; 0 for new traces.
             log_ratio: (N,) of this frame.
             dt: Seconds since the last frame.
 
@@ -139,8 +139,3 @@ class Evidence:
         weight = min(1.0, dt / self.correlation_time)
         kept = np.exp(-dt / self.memory) * np.asarray(log_odds, float)
         return np.asarray(np.clip(kept + weight * np.asarray(log_ratio, float), -self.limit, self.limit))
-
-    @staticmethod
-    def start(p_car: float = 0.5) -> float:
-        """Return the log odds of a prior probability."""
-        return float(logit(p_car))

@@ -1,10 +1,8 @@
 """Vertical condensing: a frame's features summed down the columns into profiles (paper 1, section III).
 
-The paper merges whatever stands above one x. Here the segments are first gathered into clusters that agree
-in x and lie close
-together in y, so that a pole before a far car, or two cars in line, keep centres of their own; the profile
-stays what
-decides whether a centre is strong enough to be one.
+The paper merges whatever stands above one x. Here the segments are first gathered into clusters that agree in
+x and lie close together in y, so that a pole before a far car, or two cars in line, keep centres of their
+own; the profile stays what decides whether a centre is strong enough to be one.
 """
 
 from __future__ import annotations
@@ -53,9 +51,8 @@ class Centres:
 def band_rows(horizon: float, height: int, width: int) -> tuple[int, int]:
     """Return the rows [top, bottom) in which vehicles show, by p(x, y | C) (`tracker.in_car.occurrence`).
 
-    From the roof of a near van above the horizon down to the ground some five metres ahead; in
-    units of the
-    picture's width, since the focal length scales with it.
+    From the roof of a near van above the horizon down to the ground some five metres ahead; in units of
+    the picture's width, since the focal length scales with it.
     """
     top = int(np.clip(horizon - 0.09 * width, 0, height - 16))
     bottom = int(np.clip(horizon + 0.30 * width, top + 16, height))

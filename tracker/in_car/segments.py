@@ -1,9 +1,8 @@
 """Horizontal line segments: chains of edge pixels that run from left to right (paper 1, section III).
 
-Bumpers, windows, plates, roof edges and the shadow beneath a vehicle give horizontal edges at every
-distance. A general line
-detector takes longer than a frame may; here the vertical derivative is thinned along the columns and its
-maxima are chained from column to column, one pass over the picture.
+Bumpers, windows, plates, roof edges and the shadow beneath a vehicle give horizontal edges at every distance.
+A general line detector takes longer than a frame may; here the vertical derivative is thinned along the
+columns and its maxima are chained from column to column, one pass over the picture.
 """
 
 from __future__ import annotations
@@ -155,9 +154,8 @@ def find_segments(
         limit: Chains that are followed at most; further ones are left out.
 
     Returns:
-        (M, 6): x0, x1 (half-open, px), mean y (px), mean magnitude of the derivative, its sign (1: brighter
-        below, like
-        the lower edge of a shadow), and the rise in rows from end to end.
+        (M, 6): x0, x1 (half-open, px), mean y (px), mean magnitude of the derivative, its sign (1:
+        brighter below, like the lower edge of a shadow), and the rise in rows from end to end.
     """
     columns = np.ascontiguousarray(cv2.transpose(derivative))
     found: Floats = _chain(columns, np.int16(np.ceil(threshold)), slope, shortest, limit)

@@ -1,12 +1,10 @@
 """The in-car tracker: paper 1's idea with its limits mended (registry name ``in-car``).
 
-Traces come from the shared front end. What they are is decided by more than (x, v): the camera's rotation
-is estimated and
-removed, points on and around a trace are followed in both axes, and their motion is weighed against what a
-static thing
-at that row must do (`tracker.in_car.evidence`); the evidence is accumulated over time. Points that move as
-one body
-and fill a vehicle's outline become a vehicle with a box; its traces belong to it.
+Traces come from the shared front end. What they are is decided by more than (x, v): the camera's rotation is
+estimated and removed, points on and around a trace are followed in both axes, and their motion is weighed
+against what a static thing at that row must do (`tracker.in_car.evidence`); the evidence is accumulated over
+time. Points that move as one body and fill a vehicle's outline become a vehicle with a box; its traces belong
+to it.
 """
 
 from __future__ import annotations

@@ -1,13 +1,10 @@
 """The camera's own motion from the flow of all points: rotation, focus of expansion, speed.
 
 A static point moves by ``e (p - foe)`` away from the focus of expansion, ``e = V / Z``, plus what the
-rotation adds:
-``-k(x) R_y`` along x and a like term along y for the pitch (methods.md 1.2). The rotation and the focus
-follow from the
-direction of the flow alone (the epipolar constraint), whatever the depths are, and vehicles that keep their
-lane obey it too. The
-ground then gives the speed: a point of the road y px below the horizon expands at ``e = g y`` with ``g = V
-/ (f H)``.
+rotation adds: ``-k(x) R_y`` along x and a like term along y for the pitch (methods.md 1.2). The rotation and
+the focus follow from the direction of the flow alone (the epipolar constraint), whatever the depths are, and
+vehicles that keep their lane obey it too. The ground then gives the speed: a point of the road y px below the
+horizon expands at ``e = g y`` with ``g = V / (f H)``.
 """
 
 from __future__ import annotations
@@ -39,9 +36,8 @@ def _rotation(  # type: ignore[no-untyped-def]
 ):
     """Robust least squares for the rotation's shifts a (x) and b (y) of the picture's middle, px a frame.
 
-    Residual of a static point: ((dx + a kx) y - (dy - b ky) x) / r with kx = 1 + x^2/f^2, ky = 1 + y^2/f^2;
-    mixed terms
-    x y / f^2 included. Cauchy weights, six rounds.
+    Residual of a static point: ((dx + a kx) y - (dy - b ky) x) / r with kx = 1 + x^2/f^2, ky = 1 +
+    y^2/f^2; mixed terms x y / f^2 included. Cauchy weights, six rounds.
     """
     a, b = guess_a, guess_b
     for _ in range(6):
