@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from itertools import count
 
 import cv2
 import numpy as np
@@ -21,7 +22,8 @@ from scenarios.score.frames import scored_frames
 from scenarios.score.summary import DEFAULTS
 from tracker.motorcycle_lane.background import PAPER, BackgroundModel
 from tracker.motorcycle_lane.blobs import clean
-from tracker.motorcycle_lane.shadows import Shadows
+from tracker.motorcycle_lane.shade import STANDING, expectation, shadow_of
+from tracker.motorcycle_lane.tracker import MotorcycleLaneTracker
 from tracker.types import Diagnostics, Frame, Info, Tracks
 
 SCENARIOS = ("lane-day", "lane-dense", "lane-wrong-way", "lane-parked", "lane-cloudy", "lane-flash")
@@ -59,12 +61,28 @@ class MaskOnly:
 
 
 def ours(info: Info) -> Apply:
-    """Our model and its shadow removal, as the tracker uses them."""
-    model, shadows = BackgroundModel(info.width, info.height), Shadows()
+    """Our model and its shadow removal, where nobody is expected."""
+    model = BackgroundModel(info.width, info.height)
+    odds = expectation(STANDING, np.zeros((0, 4)), info.height, info.width)
 
     def apply(image: NDArray[np.uint8]) -> Mask:
         raw = model.apply(image)
-        return shadows.remove(image, model.background, raw)
+        return raw & ~shadow_of(image, model.background, raw, odds)
+
+    return apply
+
+
+def tracking(info: Info) -> Apply:
+    """What our tracker shows: it knows where to expect riders."""
+    tracker = MotorcycleLaneTracker()
+    tracker.start(info)
+    ticks = count()
+
+    def apply(image: NDArray[np.uint8]) -> Mask:
+        tick = next(ticks)
+        tracker.step(Frame(image=image, tick=tick, time=tick / info.rate))
+        assert tracker.diagnostics.mask is not None
+        return tracker.diagnostics.mask
 
     return apply
 
@@ -80,6 +98,7 @@ def opencv(make: Callable[[], cv2.BackgroundSubtractor]) -> Callable[[Info], App
 
 
 MODELS: dict[str, Callable[[Info], Apply]] = {
+    "tracker": tracking,
     "ours": ours,
     "ours, shadows kept": lambda info: BackgroundModel(info.width, info.height).apply,
     "as printed": lambda info: BackgroundModel(info.width, info.height, PAPER).apply,

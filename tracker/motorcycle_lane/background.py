@@ -62,8 +62,8 @@ class BackgroundParameters:
         least_change: Grey levels that are always noise. Raising it loses pale objects, lowering it sends
             noisy pixels through the tables, which takes time.
         most_change: Grey levels that never are noise.
-        flash_share: Share of foreground pixels from which the light must have changed. Raising it withstands
-            denser traffic.
+        flash_share: By how much the share of foreground pixels must have grown at once for the light to have
+            changed. Raising it withstands larger objects, and misses a sun that only shines on a part.
         flash_frames: Successive frames of such a share before all is learnt anew.
         follow_light: Whether the background image behind foreground follows the light of the rest, so it
             fits when it is seen again.
@@ -87,9 +87,9 @@ class BackgroundParameters:
     gradient_floor: float = 8.0
     pair_tolerance: int = 2
     once_off: float = 0.85
-    least_change: int = 15
+    least_change: int = 12
     most_change: int = 30
-    flash_share: float = 0.5
+    flash_share: float = 0.25
     flash_frames: int = 3
     follow_light: bool = True
     uncovered: bool = True
@@ -107,6 +107,7 @@ PAPER = BackgroundParameters(
     tolerance=0.005,
     colour_floor=0.0,
     least_change=10,
+    flash_share=0.5,
     follow_light=False,
     uncovered=False,
     rims=False,
@@ -142,6 +143,8 @@ class BackgroundModel:
         self._earlier = np.float32(0.0)
         self._frames = 0
         self._flashing = 0
+        # Share of foreground in the last frame that was no flash.
+        self._calm = 0.0
 
     @property
     def background(self) -> NDArray[np.uint8]:
@@ -190,8 +193,10 @@ class BackgroundModel:
             if self._frames == p.start_frames:
                 self._settle()
             mask = self._step(pixels, features)
-            flash = mask.mean() > p.flash_share and not self.training
+            share = float(mask.mean())
+            flash = share > self._calm + p.flash_share and not self.training
             self._flashing = self._flashing + 1 if flash else 0
+            self._calm = self._calm if flash else share
         self._previous = pixels.copy()
         self._frames += 1
         if self._flashing == p.flash_frames:

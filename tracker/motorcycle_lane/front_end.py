@@ -20,15 +20,25 @@ class Sight:
     Attributes:
         image: (H, W, 3) RGB.
         mask: (H, W) foreground, cleaned.
+        doubtful: (H, W) what was foreground, too, but was taken for shadow.
         blobs: Its regions.
     """
 
     image: NDArray[np.uint8]
     mask: NDArray[np.bool_]
+    doubtful: NDArray[np.bool_]
     blobs: Blobs
 
 
-def look(image: NDArray[np.uint8], raw: NDArray[np.bool_]) -> Sight:
-    """Clean the raw foreground (H, W) of a picture (H, W, 3) and find its regions."""
-    mask = clean(raw)
-    return Sight(image=image, mask=mask, blobs=find_blobs(mask, max(15, round(LEAST_AREA * mask.size))))
+def look(image: NDArray[np.uint8], raw: NDArray[np.bool_], shadow: NDArray[np.bool_] | None = None) -> Sight:
+    """Clean the foreground of a picture and find its regions.
+
+    Args:
+        image: (H, W, 3) RGB.
+        raw: (H, W) raw foreground.
+        shadow: (H, W) what of it is taken for shadow, if that was looked for.
+    """
+    shadow = np.zeros_like(raw) if shadow is None else shadow
+    mask = clean(raw & ~shadow)
+    blobs = find_blobs(mask, max(15, round(LEAST_AREA * mask.size)))
+    return Sight(image=image, mask=mask, doubtful=shadow & ~mask, blobs=blobs)

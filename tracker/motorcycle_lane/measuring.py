@@ -24,6 +24,8 @@ Flags = NDArray[np.bool_]
 
 TOO_LARGE = 1.4
 """A region so many times as wide or as high as a rider holds more than one, or one and something else."""
+TOO_SHORT = 1.2
+"""A region by so much narrower or lower than its track is only a part of the rider."""
 TOO_SMALL = 0.25
 """A region of a smaller share of a rider's box, not at the border, is no rider."""
 LEAST_WORTH = 0.45
@@ -33,10 +35,12 @@ LEAST_SEEN = 0.25
 MOST_ADDED = 4
 CORE, FEET = 0.12, 0.3
 """Least share of a box that a row or column of a region's core fills; lowest share, where shadows lie."""
+DRAWN = 0.3
+"""Share of a row that must be doubtful for a rider to reach down to it."""
 EATEN = 0.75
 """What the median filter takes off each end of a rider, px."""
-TRAINING = 30
-"""Frames in which the background is not yet known, nor then what is a rider."""
+TRAINING = 15
+"""Frames in which it is not yet known what each pixel shows most often, nor then what is a rider."""
 LIMIT = 1.5
 """Log likelihood ratios of a pixel's colour lie between this and its negative."""
 SWEEPS = 2
@@ -59,6 +63,11 @@ class Expected:
     sizes: Floats
     references: Floats
     moved: Flags
+
+    @property
+    def boxes(self) -> Floats:
+        """(N, 4) x0, y0, x1, y1."""
+        return np.concatenate([self.centres - 0.5 * self.sizes, self.centres + 0.5 * self.sizes], 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,6 +148,26 @@ def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
     return found
 
 
+@njit(cache=True)
+def reach_down(doubtful, boxes, heights):  # type: ignore[no-untyped-def]
+    """Return the boxes (N, 4) drawn downwards over what may be a part of them or their shadow.
+
+    Args:
+        doubtful: (H, W) bool, what was taken for shadow.
+        boxes: (N, 4) x0, y0, x1, y1.
+        heights: (N,) how high they may become, px.
+    """
+    found = boxes.copy()
+    for k in range(boxes.shape[0]):
+        x0, x1 = max(int(boxes[k, 0]), 0), min(int(np.ceil(boxes[k, 2])), doubtful.shape[1])
+        bottom = min(boxes[k, 1] + heights[k], float(doubtful.shape[0]))
+        y = int(boxes[k, 3])
+        while y < bottom and np.sum(doubtful[y, x0:x1]) >= DRAWN * (x1 - x0):
+            y += 1
+        found[k, 3] = max(boxes[k, 3], min(float(y), bottom))
+    return found
+
+
 def complete(visible: Floats, touches: Flags, sizes: Floats) -> Floats:
     """Return the whole boxes (N, 4) of riders that the picture's border cuts off.
 
@@ -173,9 +202,7 @@ class Measurer:
         """Return what is seen, given what is expected."""
         blobs = sight.blobs
         bins = colour.bin_pixels(sight.image, blobs.labels)
-        half = 0.5 * expected.sizes
-        boxes = np.concatenate([expected.centres - half, expected.centres + half], 1)
-        inside = count_inside(blobs.labels, boxes, len(blobs))
+        inside = count_inside(blobs.labels, expected.boxes, len(blobs))
         linked = inside >= 0.2 * (expected.sizes.prod(1))[:, None]
         linked |= (inside >= 0.5 * blobs.areas) & (blobs.areas > 0)
         of_track, of_blob = components(linked)
@@ -208,11 +235,13 @@ class Measurer:
                 continue
             if len(tracks) < 2 and len(regions) == 1:
                 size = expected.sizes[tracks[0]] if len(tracks) else usual[b]
+                if known[b]:
+                    whole[b] = reach_down(sight.doubtful, whole[b : b + 1], size[1:])[0]
                 if len(tracks) and at_border[b]:
                     whole[b] = complete(visible[b : b + 1], touches[b : b + 1], size[None])[0]
                 shown = whole[b, 2:] - whole[b, :2]
                 fits = (shown <= TOO_LARGE * size).all()
-                fits &= len(tracks) == 0 or (shown >= size / TOO_LARGE).all()
+                fits &= len(tracks) == 0 or (shown >= size / TOO_SHORT).all()
                 if fits or not known[b]:
                     alone.append(b)
                     continue
@@ -232,6 +261,7 @@ class Measurer:
             )
         ]
         owner = numbers[blobs.labels] if apart else blobs.labels
+        owner = np.where((owner == 0) & sight.doubtful, -1, owner)
         for number, (tracks, regions) in enumerate(apart):
             x0, y0 = blobs.boxes[regions, :2].min(0)
             x1, y1 = blobs.boxes[regions, 2:].max(0)

@@ -149,7 +149,8 @@ def place(shape, groups, group, bins, centres, sizes, tables, sweeps):  # type: 
 
     Args:
         shape: (ROWS, COLUMNS) of a silhouette.
-        groups: (H, W) int32, number of the group of each foreground pixel; 0 is background.
+        groups: (H, W) int32, number of the group of each foreground pixel; 0 is background, -1 what may be it
+            or a rider: it costs nothing here, and as much as background to a rider whom nobody expects.
         group: Which one.
         bins: (H, W) colour bin of each foreground pixel.
         centres: (K, 2) where they are expected; on return where they are.
@@ -264,7 +265,7 @@ def unexplained(  # type: ignore[no-untyped-def]
         for x in range(left, right):
             if groups[y, x] == group:
                 gain[y - top, x - left] = 1.0
-            elif groups[y, x] == 0:
+            elif groups[y, x] <= 0:
                 gain[y - top, x - left] = -ON_BACKGROUND
     for k in range(centres.shape[0]):
         _claim(shape, gain, left, top, centres[k], sizes[k])

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.motorcycle_lane.background import BackgroundModel
+from tracker.motorcycle_lane.blobs import clean
 from tracker.motorcycle_lane.episode import EpisodeTracker
 from tracker.motorcycle_lane.flow import Flow
-from tracker.motorcycle_lane.front_end import look
-from tracker.motorcycle_lane.measuring import Measurer
-from tracker.motorcycle_lane.shadows import Shadows
+from tracker.motorcycle_lane.front_end import Sight, look
+from tracker.motorcycle_lane.measuring import Expected, Measurer
+from tracker.motorcycle_lane.shade import STANDING, expectation, raise_upright, shadow_of
 from tracker.motorcycle_lane.tracks import TrackStore
 from tracker.types import Association, Diagnostics, Frame, Predictions, Status, Tracks
 
@@ -28,7 +29,6 @@ class MotorcycleLaneTracker(EpisodeTracker):
 
     def _begin(self) -> None:
         self._background = BackgroundModel(self._info.width, self._info.height)
-        self._shadows = Shadows()
         self._measurer = Measurer(self._info.width, self._info.height)
         self._store = TrackStore(self._info.width, self._info.height, self._info.rate)
         self._flow = Flow(self._info.width, self._info.height, self._info.rate)
@@ -46,19 +46,19 @@ class MotorcycleLaneTracker(EpisodeTracker):
     def step(self, frame: Frame) -> Tracks:
         """Return the tracks of this frame; what was returned is final."""
         store = self._store
-        raw, behind = self._foreground(frame.image)
-        sight = look(frame.image, raw)
         store.predict(self._measurer.sizes)
         tracks = store.tracks
         predictions = Predictions(
             ids=tracks.ids, centres=tracks.centres.copy(), covariances=tracks.covariance[:, ::2, ::2].copy()
         )
         at, expected = store.expected()
+        sight = self._look(frame.image, expected)
         seen = self._measurer.measure(sight, expected)
         joined = np.zeros(len(tracks), np.bool_)
         joined[at] = seen.joined
         store.update(seen, joined)
-        association = Association(ids=predictions.ids, beta=store.beta) if len(predictions.ids) else None
+        shown = store.sure > 0.5
+        association = _shown(store.beta, predictions.ids, shown) if len(predictions.ids) else None
         tracks = store.tracks
         status = store.status()
         gone = (status == Status.CONFIRMED) & tracks.moved(1.0)
@@ -66,9 +66,9 @@ class MotorcycleLaneTracker(EpisodeTracker):
             tracks.ids[gone], tracks.centres[gone], tracks.velocities[gone], tracks.sizes[gone, 1]
         )
         self._diagnostics = Diagnostics(
-            detections=self._clip(seen.boxes),
+            detections=self._clip(seen.boxes[shown]),
             mask=sight.mask,
-            background=behind,
+            background=self._background.background,
             association=association,
             predictions=predictions,
             flags=flags,
@@ -82,12 +82,21 @@ class MotorcycleLaneTracker(EpisodeTracker):
             covariance=tracks.covariance[:, SHOWN[:, None], SHOWN],
         )
 
-    def _foreground(self, image: NDArray[np.uint8]) -> tuple[NDArray[np.bool_], NDArray[np.uint8]]:
-        """Return (H, W) what is neither background nor a shadow on it, and (H, W, 3) the background."""
+    def _look(self, image: NDArray[np.uint8], expected: Expected) -> Sight:
+        """Return what is neither background nor a shadow on it."""
         raw = self._background.apply(image)
-        background = self._background.background
-        return self._shadows.remove(image, background, raw), background
+        odds = expectation(STANDING, expected.boxes[expected.moved], *raw.shape)
+        if self._measurer.sizes.learnt:
+            (_, high), (_, grows) = self._measurer.sizes.line
+            raise_upright(odds, clean(raw), high, grows)
+        return look(image, raw, shadow_of(image, self._background.background, raw, odds))
 
     def _clip(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
         limits = np.array([self._info.width, self._info.height] * 2, float)
         return np.clip(boxes, 0.0, limits)
+
+
+def _shown(beta: NDArray[np.float64], ids: NDArray[np.int64], shown: NDArray[np.bool_]) -> Association:
+    """Return the association with what is shown of the measurements (M,); with another, a rider is missed."""
+    missed = beta[:, :1] + beta[:, 1:][:, ~shown].sum(1, keepdims=True)
+    return Association(ids=ids, beta=np.concatenate([missed, beta[:, 1:][:, shown]], 1))

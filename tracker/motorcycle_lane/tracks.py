@@ -56,7 +56,10 @@ CONFIRMED, CONFIRMING_HITS = 0.9, 3
 MOVED, ENTERED = 0.4, 0.12
 """Rider heights that a track must have gone to be confirmed: leaves sway, and lights flicker, in place. Less
 is asked of one that began at the border, where riders come from."""
-IN_FRAME = 0.15
+TRAINING, EARLY = 30, 1.0
+"""Frames in which leaves that sway still are foreground, and what a track that began in them must go."""
+IN_FRAME, ENOUGH_IN_FRAME = 0.15, 0.3
+"""Share of its box in the picture below which a track ends, and below which it is only presumed."""
 SIZE_RATE, COLOUR_RATE = 0.1, 0.1
 USUAL_RATE = 0.01
 """How fast a rider's size becomes the usual one of its row while it is not measured."""
@@ -161,9 +164,12 @@ class TrackStore:
     def __init__(self, width: int, height: int, rate: float) -> None:
         self.tracks = TrackArrays.none()
         self.beta: Floats = np.zeros((0, 1))
+        # (M,) probability that a measurement is of a rider that is confirmed.
+        self.sure: Floats = np.zeros(0)
         self._frame = np.array([[0.0, 0.0, width, height]])
         self._step = 1.0 / rate
         self._next = 1
+        self._frames = 0
         # Colours of riders that are not in the picture any more.
         self._others: Floats = np.full((1, colour.REGIONS, colour.BINS), 1.0 / colour.BINS)
 
@@ -194,7 +200,8 @@ class TrackStore:
         t = self.tracks
         stood = t.stood * self._step
         ghost = (stood > GHOST) & ~t.moved(1.0)
-        resting = (t.misses > COASTING_MISSES) | (stood > PARKED)
+        inside = intersection(t.boxes, self._frame)[:, 0] / np.maximum(box_area(t.boxes), 1e-9)
+        resting = (t.misses > COASTING_MISSES) | (stood > PARKED) | (inside < ENOUGH_IN_FRAME)
         found = np.where(resting, Status.COASTING, Status.CONFIRMED)
         return np.where(t.confirmed & ~ghost, found, Status.TENTATIVE).astype(np.uint8)
 
@@ -217,7 +224,9 @@ class TrackStore:
             joined: (N,) whether a track's region had to be explained by silhouettes.
         """
         t = self.tracks
+        self._frames += 1
         free = np.ones(len(seen))
+        self.sure = np.zeros(len(seen))
         if len(t):
             free = self._associate(seen, joined)
         self._end()
@@ -252,6 +261,7 @@ class TrackStore:
         t.stood = np.where(still, t.stood + 1, 0)
         self._learn(seen, beta)
         self.beta = beta
+        self.sure = beta[self.status() == Status.CONFIRMED, 1:].sum(0)
         return np.asarray(1.0 - beta[:, 1:].sum(0))
 
     def _learn(self, seen: Measurements, beta: Floats) -> None:
@@ -311,7 +321,7 @@ class TrackStore:
                 sized=seen.sized[at].astype(np.int64),
                 stood=np.zeros(count, np.int64),
                 origins=seen.centres[at],
-                asked=np.where(border, ENTERED, MOVED),
+                asked=np.full(count, EARLY) if self._frames <= TRAINING else np.where(border, ENTERED, MOVED),
             )
         )
         self._next += count

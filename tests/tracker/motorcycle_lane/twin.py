@@ -106,6 +106,7 @@ class PlainModel:
         self.p_b = np.ones(self.shape)
         self.background = self.previous = None
         self.frames = self.flashing = 0
+        self.calm = 0.0
 
     def apply(self, image, grey):
         p = self.parameters
@@ -155,7 +156,10 @@ class PlainModel:
             sums, old = self.background[seen].sum(0), before[seen].sum(0)
             growth = np.where(old > 0, sums / np.maximum(old, 1e-9), 1)
             self.background[learnt] = np.minimum(self.background[learnt] * growth, 255)
-        self.flashing = self.flashing + 1 if mask.mean() > p.flash_share and not training else 0
+        if mask.mean() - self.calm > p.flash_share and not training:
+            self.flashing += 1
+        else:
+            self.flashing, self.calm = 0, mask.mean()
         self.frames += 1
         self.previous = image
         if self.flashing == p.flash_frames:
