@@ -57,8 +57,7 @@ class MotorcycleLaneTracker(EpisodeTracker):
         joined = np.zeros(len(tracks), np.bool_)
         joined[at] = seen.joined
         store.update(seen, joined)
-        shown = store.sure > 0.5
-        association = _shown(store.beta, predictions.ids, shown) if len(predictions.ids) else None
+        association = Association(ids=predictions.ids, beta=store.beta) if len(predictions.ids) else None
         tracks = store.tracks
         status = store.status()
         gone = (status == Status.CONFIRMED) & tracks.moved(1.0)
@@ -66,7 +65,7 @@ class MotorcycleLaneTracker(EpisodeTracker):
             tracks.ids[gone], tracks.centres[gone], tracks.velocities[gone], tracks.sizes[gone, 1]
         )
         self._diagnostics = Diagnostics(
-            detections=self._clip(seen.boxes[shown]),
+            detections=self._clip(seen.boxes),
             mask=sight.mask,
             background=self._background.background,
             association=association,
@@ -94,9 +93,3 @@ class MotorcycleLaneTracker(EpisodeTracker):
     def _clip(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
         limits = np.array([self._info.width, self._info.height] * 2, float)
         return np.clip(boxes, 0.0, limits)
-
-
-def _shown(beta: NDArray[np.float64], ids: NDArray[np.int64], shown: NDArray[np.bool_]) -> Association:
-    """Return the association with what is shown of the measurements (M,); with another, a rider is missed."""
-    missed = beta[:, :1] + beta[:, 1:][:, ~shown].sum(1, keepdims=True)
-    return Association(ids=ids, beta=np.concatenate([missed, beta[:, 1:][:, shown]], 1))

@@ -164,8 +164,6 @@ class TrackStore:
     def __init__(self, width: int, height: int, rate: float) -> None:
         self.tracks = TrackArrays.none()
         self.beta: Floats = np.zeros((0, 1))
-        # (M,) probability that a measurement is of a rider that is confirmed.
-        self.sure: Floats = np.zeros(0)
         self._frame = np.array([[0.0, 0.0, width, height]])
         self._step = 1.0 / rate
         self._next = 1
@@ -226,7 +224,6 @@ class TrackStore:
         t = self.tracks
         self._frames += 1
         free = np.ones(len(seen))
-        self.sure = np.zeros(len(seen))
         if len(t):
             free = self._associate(seen, joined)
         self._end()
@@ -261,7 +258,6 @@ class TrackStore:
         t.stood = np.where(still, t.stood + 1, 0)
         self._learn(seen, beta)
         self.beta = beta
-        self.sure = beta[self.status() == Status.CONFIRMED, 1:].sum(0)
         return np.asarray(1.0 - beta[:, 1:].sum(0))
 
     def _learn(self, seen: Measurements, beta: Floats) -> None:
