@@ -1,8 +1,8 @@
 """The ground without its traffic: a background in the mosaic, and what differs from it.
 
 A window of the mosaic goes along with the view. Each of its pixels keeps a mean colour with its usual
-deviation, so that edges, which never lie quite still, are taken for what they are, and a rival colour. The
-rival takes over once it has been seen more often: soon where the first sight was of a vehicle, late
+deviation and a rival colour. A colour between those of a pixel's neighbours is nothing new: edges never lie
+quite still, and what stands above the ground shifts as the camera moves. The rival takes over once it has been seen more often: soon where the first sight was of a vehicle, late
 elsewhere, and never below a track, since vehicles queue.
 """
 
@@ -21,6 +21,7 @@ LEAST_CHANGE = 8.0
 """Grey levels of a channel that are always noise."""
 DEVIATIONS = 2.5
 """Usual deviations that are noise."""
+NEIGHBOURS = np.ones((3, 3), np.uint8)
 AROUND = 4
 """Half side of the patch of ground that tells the light, px."""
 RATE = 1.0 / 50.0
@@ -80,11 +81,14 @@ class Background:
         for box in np.round(kept - np.tile(here, 2)).astype(int).tolist():
             protected[max(box[1], 0) : max(box[3], 0), max(box[0], 0) : max(box[2], 0)] = True
         part = np.s_[y0:y1, x0:x1]
+        mean = np.ascontiguousarray(self._mean[part])
         return np.asarray(
             _compare(
                 self.laid,
                 self.valid,
                 protected,
+                cv2.erode(mean, NEIGHBOURS),
+                cv2.dilate(mean, NEIGHBOURS),
                 self._mean[part],
                 self._spread[part],
                 self._support[part],
@@ -137,7 +141,7 @@ class Background:
 
 
 @njit(cache=True)
-def _compare(laid, valid, protected, mean, spread, support, rival, rivals):  # type: ignore[no-untyped-def]
+def _compare(laid, valid, protected, low, high, mean, spread, support, rival, rivals):  # type: ignore[no-untyped-def]
     """Return the foreground (h, w) and learn in place; see `Background`."""
     height, width = valid.shape
     found = np.zeros((height, width), np.bool_)
@@ -153,7 +157,7 @@ def _compare(laid, valid, protected, mean, spread, support, rival, rivals):  # t
             most, other = np.float32(0.0), np.float32(0.0)
             for c in range(3):
                 now = np.float32(laid[i, j, c])
-                most = max(most, abs(now - mean[i, j, c]))
+                most = max(most, now - high[i, j, c], low[i, j, c] - now)
                 other = max(other, abs(now - np.float32(rival[i, j, c])))
             change = LEAST_CHANGE + DEVIATIONS * spread[i, j]
             if most <= change:
