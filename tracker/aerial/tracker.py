@@ -32,11 +32,14 @@ LEAST_AREA = 30
 BORDER = 3.0
 """Px from the picture's border within which an outline is cut off."""
 MOVED = 0.5
-"""Lengths that a track must have gone to be confirmed: what only seems to move does not go far."""
+"""Lengths, its own or usual ones, that a track must have gone to be confirmed: what only seems to move does not
+go far."""
 COMPACT = 0.6
 """Share of a rectangle that is foreground where a track begins: what is less may be two vehicles."""
 ENOUGH = 5
 """Vehicles whose median size is the usual one."""
+SMALLEST = np.array([0.5, 0.5])
+"""Length and width, in usual ones, from which on a region may be a vehicle's."""
 LARGEST = np.array([1.4, 1.5])
 """Length and width of a region, in usual ones, up to which it is one vehicle's."""
 USUAL_LIGHT = 100.0
@@ -68,6 +71,7 @@ class AerialTracker:
         self._hidden = HiddenVehicles(self._forecaster, self._matcher, info.width, info.height, info.rate)
         self._ids = itertools.count(1)
         self._tick = -1
+        self._usual = np.zeros(2)
         self._diagnostics = Diagnostics()
 
     @property
@@ -119,7 +123,8 @@ class AerialTracker:
         for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
             tracks.measure(missed[i], free.centres[j], free.sizes[j], self._tick, bool(cut[j]))
         compact = free.pixels >= COMPACT * free.sizes.prod(1)
-        for j in np.setdiff1d(np.flatnonzero(compact & (free.pixels > 0)), columns).tolist():
+        large = (free.sizes >= SMALLEST * self._usual).all(1)
+        for j in np.setdiff1d(np.flatnonzero(compact & large & (free.pixels > 0)), columns).tolist():
             self._tracks.append(tracks.begin(next(self._ids), free, j, self._tick))
         found = np.concatenate([own.corners()[own.pixels > 0] + origin, free.corners()])
         return _boxes(transform(to_picture, found))
@@ -128,7 +133,9 @@ class AerialTracker:
         """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of the known."""
         sizes = free_outlines(blobs.labels, len(blobs)).sizes
         known = np.array([track.size for track in self._tracks if track.confirmed and track.whole])
-        usual = np.median(known if len(known) > ENOUGH else sizes, axis=0) if len(sizes) else np.zeros(2)
+        if len(known) > ENOUGH:
+            self._usual = np.median(known, axis=0)
+        usual = self._usual if self._usual.any() or not len(sizes) else np.median(sizes, axis=0)
         return np.append(False, (sizes <= usual * LARGEST).all(1))
 
     def _remember(self, image: NDArray[np.uint8], to_mosaic: Floats) -> None:
@@ -178,7 +185,7 @@ class AerialTracker:
             and track.whole
             and track.hits >= tracks.CONFIRMING_HITS
             and track.pictures
-            and track.went(MOVED)
+            and track.went(MOVED * max(1.0, self._usual[0] / track.size[0]))
         ]
         for old, track in self._hidden.reacquire(new, to_mosaic):
             self._join(old, track)

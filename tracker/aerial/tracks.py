@@ -31,7 +31,7 @@ MOST_MISSES = 2
 """Successive misses after which a confirmed track is hidden, and any other one ends."""
 SLOWEST = 0.25
 """Px a frame below which a heading is kept as it was."""
-GROW, SHRINK = 0.3, 0.04
+GROW, SHRINK = 0.15, 0.1
 """How fast the size follows larger and smaller outlines."""
 PICTURE_EVERY = 4
 
@@ -151,10 +151,8 @@ def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool
             return False
     kalman.update(track.state, track.spread, np.arange(2), at, noise)
     if track.whole or track.hits <= 3:
-        rate = np.where(size > track.size, GROW, SHRINK if track.hits > 3 else GROW)
+        rate = np.where(size > track.size, GROW, SHRINK) if track.hits > 3 else 0.3
         track.size = np.maximum(track.size + rate * (size - track.size), 4.0)
-    else:
-        track.size = np.where(size > track.size, track.size + GROW * (size - track.size), track.size)
     track.hits, track.misses, track.since = track.hits + 1, 0, tick
     turn_to_velocity(track)
     return True
