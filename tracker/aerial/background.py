@@ -22,8 +22,6 @@ LEAST_CHANGE = 8.0
 DEVIATIONS = 2.5
 """Usual deviations that are noise."""
 NEIGHBOURS = np.ones((3, 3), np.uint8)
-AROUND = 4
-"""Half side of the patch of ground that tells the light, px."""
 RATE = 1.0 / 50.0
 NEW_SPREAD = 4.0
 """Usual deviation of a new pixel, grey levels."""
@@ -101,12 +99,6 @@ class Background:
         """Return (h, w, 3) the background image of the view."""
         x0, y0, x1, y1 = self.view
         return np.asarray(np.round(self._mean[y0:y1, x0:x1]).astype(np.uint8))
-
-    def light(self, place: Floats) -> float:
-        """Return the grey level of the ground about a place (2,) of the mosaic, at least 20."""
-        x, y = (place - self.origin).astype(int)
-        around = self._mean[max(y - AROUND, 0) : y + AROUND + 1, max(x - AROUND, 0) : x + AROUND + 1]
-        return max(float(around.mean()), 20.0) if around.size else 100.0
 
     def _go_along(self, corners: Floats) -> None:
         """Move the window if the view leaves it."""

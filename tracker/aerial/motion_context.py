@@ -46,11 +46,11 @@ class ContextParameters:
     most: float = 10.0
     slack: float = 0.3
     path: float = 0.7
-    reach: float = 60.0
+    reach: float = 120.0
     nearness: float = 0.25
     predictors: int = 7
     fewest: int = 1
-    ridge: float = 25.0
+    ridge: float = 400.0
     paced: bool = True
     search_every: int = 5
 
@@ -129,7 +129,7 @@ class ContextForecast:
         section, self._tick = last_section(trajectories, track, self._parameters.window)
         self._began = self._base = self._tick
         self.point = self._base_point = drift(section[-ANCHOR:])[0]
-        self.velocity = drift(section[-self._parameters.window // 2 :])[1]
+        self.velocity = drift(section)[1]
         self._section = section
         self._way = 0.0
         self._earlier = np.zeros((2, 2))

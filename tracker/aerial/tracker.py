@@ -42,8 +42,8 @@ SMALLEST = np.array([0.5, 0.5])
 """Length and width, in usual ones, from which on a region may be a vehicle's."""
 LARGEST = np.array([1.4, 1.5])
 """Length and width of a region, in usual ones, up to which it is one vehicle's."""
-USUAL_LIGHT = 100.0
-"""Grey level of the ground to which pictures are scaled: a shadow darkens vehicles and road."""
+LEAST_HISTORY = 20
+"""Frames that a track must have been measured to be forecast once it vanishes."""
 GOES = 8.0
 """Px in `WINDOW` frames from which on a track is rehearsed."""
 
@@ -88,7 +88,7 @@ class AerialTracker:
         seen = self._look(image, to_mosaic)
         self._remember(image, to_mosaic)
         self._hide()
-        self._hidden.step(self._tick, to_mosaic)
+        self._hidden.step(self._tick, to_mosaic, [track for track in self._tracks if not track.confirmed])
         self._decide(to_mosaic)
         return self._shown(to_mosaic, seen)
 
@@ -153,7 +153,7 @@ class AerialTracker:
                 picture = appearance.cut(
                     image, middle, turn @ (half[0] * track.heading), turn @ (half[1] * across)
                 )
-                track.pictures.append(picture * (USUAL_LIGHT / self._background.light(track.centre)))
+                track.pictures.append(picture)
         if whole:
             self._hidden.occluders.see(
                 np.array([track.centre for track in whole]), np.array([track.heading for track in whole])
@@ -172,7 +172,12 @@ class AerialTracker:
     def _hide(self) -> None:
         """End what was not found again; of what was a vehicle for sure a forecast is begun."""
         for track in self._tracks:
-            if track.misses >= tracks.MOST_MISSES and track.confirmed and track.id in self._trajectories:
+            if (
+                track.misses >= tracks.MOST_MISSES
+                and track.confirmed
+                and track.hits >= LEAST_HISTORY
+                and track.id in self._trajectories
+            ):
                 self._hidden.add(track, self._trajectories)
         self._tracks = [track for track in self._tracks if track.misses < tracks.MOST_MISSES]
 
