@@ -25,7 +25,7 @@ USUAL = 14.0
 """Standard deviation of a difference within a vehicle where nothing better is known, grey levels."""
 STRANGE = 40.0
 """Standard deviation of what vehicles look like, grey levels, at least."""
-SIGHT = 20.0
+SIGHT = 15.0
 """Standard deviation of a difference between two sights of a vehicle, beyond that within a sight, grey levels:
 light and shadow have changed."""
 SHIFT = 1.0
