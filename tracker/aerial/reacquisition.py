@@ -71,8 +71,8 @@ class Fusion:
     """
 
     motion: bool = True
-    looks: float = 12.0
-    most: float = 6.0
+    looks: float = 8.0
+    most: float = 4.0
     gate: float = 16.0
     least: float = 0.0
 

@@ -96,18 +96,16 @@ class AerialTracker:
         """Measure the tracks, begin new ones; return the boxes (M, 4) of all outlines in the picture."""
         kept = np.array([_box(track.corners()) for track in self._tracks if track.went()]).reshape(-1, 4)
         mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
-        blobs = find_blobs(mask, LEAST_AREA // 2)
+        self._shadows.learn(self._background, mask)
+        blobs = find_blobs(self._shadows.take_off(mask), LEAST_AREA // 2)
         origin = self._background.origin + np.array(self._background.view[:2])
         places = np.array([track.state[:, 0] for track in self._tracks]).reshape(-1, 2) - origin
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
         sizes = np.array([track.size for track in self._tracks]).reshape(-1, 2)
-        self._shadows.learn(self._background, blobs.labels, len(blobs))
         senior = np.array([track.confirmed for track in self._tracks], np.bool_)
-        expected, wide = self._shadows.cast(places, headings, sizes)
-        own, beaten, left = outline(blobs.labels, self._single(blobs), senior, expected, headings, wide)
-        own = self._shadows.lift(own)
+        own, beaten, left = outline(blobs.labels, self._single(blobs), senior, places, headings, sizes)
         rest = find_blobs(left > 0, LEAST_AREA)
-        free = self._shadows.lift(free_outlines(rest.labels, len(rest)))
+        free = free_outlines(rest.labels, len(rest))
         to_picture = inverse(to_mosaic)
         cut = self._cut_off(transform(to_picture, own.corners() + origin))
         for k, track in enumerate(self._tracks):
