@@ -31,7 +31,7 @@ AROUND = 1.5
 """Lengths about a new track in which a hidden vehicle that is not seen may be that one."""
 RIM = 10.0
 """Px at the picture's border where nothing is sure to be seen."""
-INSIDE, ENTERING = 1e-5, 3e-4
+INSIDE, ENTERING = 1e-5, 1e-4
 """Vehicles never seen before that turn up, a px^2, inside the picture and where they come in."""
 ENTRY = 45.0
 """Px of the border where vehicles come in."""
