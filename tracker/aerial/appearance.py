@@ -26,7 +26,7 @@ USUAL = 14.0
 STRANGE = 40.0
 """Standard deviation of what vehicles look like, grey levels, at least."""
 SIGHT = 15.0
-"""Standard deviation of a difference between two sights of a vehicle, beyond that within a sight, grey levels:
+"""Standard deviation of a difference between two sights of a vehicle, beyond that within one, grey levels:
 light and shadow have changed."""
 SHIFT = 1.0
 """Cells by which the patches of two sights are usually out of line."""

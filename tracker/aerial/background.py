@@ -2,8 +2,9 @@
 
 A window of the mosaic goes along with the view. Each of its pixels keeps a mean colour with its usual
 deviation and a rival colour. A colour between those of a pixel's neighbours is nothing new: edges never lie
-quite still, and what stands above the ground shifts as the camera moves. The rival takes over once it has been seen more often: soon where the first sight was of a vehicle, late
-elsewhere, and never below a track, since vehicles queue.
+quite still, and what stands above the ground shifts as the camera moves. The rival takes over once it has
+been seen more often: soon where the first sight was of a vehicle, late elsewhere, and never below a track,
+since vehicles queue.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """How far ahead of its forecast, or behind it, a hidden vehicle may be, given where it has not been seen.
 
-A vehicle that goes faster or slower than it was forecast to goes on doing so: it keeps its place on the ellipse
-of the forecast while that grows. Every frame in which nothing is seen where a vehicle would be in plain view
-speaks against that place. So a forecast that has run out from under a bridge is held back below it, and of two
-vehicles of one lane the first that went in is the first to come out.
+A vehicle that goes faster or slower than it was forecast to goes on doing so: it keeps its place on the
+ellipse of the forecast while that grows. Every frame in which nothing is seen where a vehicle would be in
+plain view speaks against that place. So a forecast that has run out from under a bridge is held back below
+it, and of two vehicles of one lane the first that went in is the first to come out.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ MEMORY = 60
 """Rehearsals that are remembered."""
 BELIEF = 10
 """Rehearsals that the growth as it is set counts for."""
-LEAST, MOST = 0.6, 10.0
+LEAST, MOST = 0.1, 10.0
 
 
 def quantile(share: ArrayLike) -> Floats:

@@ -29,6 +29,9 @@ LOST = 0.03
 """Chance that a vehicle that vanishes does not come back at all: it may never have been one."""
 AROUND = 1.5
 """Lengths about a new track in which a hidden vehicle that is not seen may be that one."""
+KEPT = 0.6
+"""Share of the usual covariance that is kept however well rehearsals went: it is below bridges and at
+their ends that drivers brake, and there nobody can be rehearsed."""
 RIM = 10.0
 """Px at the picture's border where nothing is sure to be seen."""
 INSIDE, ENTERING = 1e-5, 1e-4
@@ -53,6 +56,7 @@ class HiddenVehicles:
         self._calibration = Calibration(forecaster)
         self._size = np.array([width, height], float)
         self._longest = round(LONGEST * rate)
+        self._tick = 0
         self._unlikely: dict[int, int] = {}
         self._beliefs: dict[int, Belief] = {}
 
@@ -75,6 +79,7 @@ class HiddenVehicles:
             begun: Tracks of which it is not yet decided who they are.
         """
         left = []
+        self._tick = tick
         to_picture = inverse(to_mosaic)
         for track in self.tracks:
             assert track.forecast is not None
@@ -92,8 +97,7 @@ class HiddenVehicles:
     def covariance(self, track: Track) -> Floats:
         """Return (2, 2) of a forecast, calibrated, px^2."""
         assert track.forecast is not None
-        lead = max(track.misses, 1)
-        return self._calibration.scale(lead) * track.forecast.covariance
+        return max(self._calibration.scale(self._tick - track.since), KEPT) * track.forecast.covariance
 
     def _visible(self, track: Track, to_picture: Floats, begun: Sequence[Track]) -> Floats:
         """Return (K,) the chance that a hidden vehicle is in plain view at each offset of its belief."""
@@ -140,4 +144,4 @@ class HiddenVehicles:
         belief = self._beliefs[track.id]
         covariance = self.covariance(track) + np.eye(2)
         still = np.log(belief.unseen / (belief.unseen + LOST))
-        return still + belief.log_density(points, track.centre, track.heading, covariance)
+        return np.asarray(still + belief.log_density(points, track.centre, track.heading, covariance))

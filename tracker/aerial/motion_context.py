@@ -73,7 +73,7 @@ FASTEST = 1.6
 STILL = 4.0
 """Px in F frames below which a section has no pace."""
 SAME_WAY = 0.9
-"""Cosine of the angle between the ways of two sections: slow vehicles on a bridge end near those below, too."""
+"""Cosine of the angle between the ways of two sections: slow vehicles on a bridge end near those below."""
 ANCHOR = 9
 """Points through which a line gives the last seen position."""
 BACK = np.arange(1.0 - ANCHOR, 1.0)
@@ -241,7 +241,7 @@ class ContextForecast:
             self.guides += more
 
     def _guide(self, track: int, end: int) -> Guide | None:
-        """Make a predictor of the section that ends with a track's point ``end``; None if it goes another way."""
+        """Make a predictor of the section that ends with a point ``end``; None if it goes another way."""
         first, last = self._trajectories.extent(track)
         begin = float(first + end)
         if not self._parameters.paced:

@@ -107,7 +107,9 @@ class Stabiliser:
         """Fit a homography to the corners of key frames; None where too few are found again."""
         pairs = [_flow(key, grey, self._to_mosaic) for key in keys]
         now = np.concatenate([np.zeros((0, 2)), *(there for _, there in pairs)])
-        then = np.concatenate([np.zeros((0, 2)), *(k.places[at] for k, (at, _) in zip(keys, pairs, strict=True))])
+        then = np.concatenate(
+            [np.zeros((0, 2)), *(k.places[at] for k, (at, _) in zip(keys, pairs, strict=True))]
+        )
         if len(now) < LEAST_ON_PLANE:
             return None
         fit, on_plane = cv2.findHomography(now, then, cv2.RANSAC, ON_PLANE, maxIters=500)
@@ -170,4 +172,4 @@ def _corners(grey: Grey) -> Floats:
     cells = x * CELLS[0] // grey.shape[1] + CELLS[0] * (y * CELLS[1] // grey.shape[0])
     kept = [np.flatnonzero(cells == cell)[:CORNERS] for cell in range(CELLS[0] * CELLS[1])]
     chosen = np.concatenate(kept)
-    return np.column_stack([x[chosen], y[chosen]]) + 0.5
+    return np.column_stack([x[chosen], y[chosen]]).astype(np.float64) + 0.5

@@ -32,8 +32,8 @@ LEAST_AREA = 30
 BORDER = 3.0
 """Px from the picture's border within which an outline is cut off."""
 MOVED = 0.5
-"""Lengths, its own or usual ones, that a track must have gone to be confirmed: what only seems to move does not
-go far."""
+"""Lengths, its own or usual ones, that a track must have gone to be confirmed: what only seems to move
+does not go far."""
 COMPACT = 0.6
 """Share of a rectangle that is foreground where a track begins: what is less may be two vehicles."""
 ENOUGH = 5
@@ -94,7 +94,8 @@ class AerialTracker:
 
     def _look(self, image: NDArray[np.uint8], to_mosaic: Floats) -> Floats:
         """Measure the tracks, begin new ones; return the boxes (M, 4) of all outlines in the picture."""
-        kept = np.array([_box(track.corners()) for track in self._tracks if track.confirmed or track.went()]).reshape(-1, 4)
+        sure = [_box(track.corners()) for track in self._tracks if track.confirmed or track.went()]
+        kept = np.array(sure).reshape(-1, 4)
         mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
         self._shadows.learn(self._background, mask)
         blobs = find_blobs(self._shadows.take_off(mask), LEAST_AREA // 2)

@@ -154,7 +154,8 @@ def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool
         missing = 0.5 * max(track.size[0] - size[0], 0.0)
         candidates = np.array([apart[0] - missing, apart[0] + missing])
         ahead = candidates[np.abs(candidates).argmin()]
-        kalman.update(track.state, track.spread, np.arange(2), track.state[:, 0] + ahead * track.heading, PART**2)
+        at = track.state[:, 0] + ahead * track.heading
+        kalman.update(track.state, track.spread, np.arange(2), at, PART**2)
         track.hits, track.misses, track.since = track.hits + 1, 0, tick
         return True
     if settled:
@@ -162,10 +163,7 @@ def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool
         if squared > GATE:
             return False
     kalman.update(track.state, track.spread, np.arange(2), centre, NOISE**2)
-    if settled:
-        rate = np.where(size > track.size, GROW, SHRINK)
-    else:
-        rate = np.full(2, NEW)
+    rate = np.where(size > track.size, GROW, SHRINK) if settled else np.full(2, NEW)
     track.size = np.maximum(track.size + rate * (size - track.size), 4.0)
     track.hits, track.misses, track.since = track.hits + 1, 0, tick
     turn_to_velocity(track)

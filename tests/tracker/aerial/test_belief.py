@@ -44,7 +44,7 @@ def test_a_vehicle_is_not_where_it_would_have_been_seen():
 
 
 def test_the_first_in_is_the_first_out():
-    """Both forecasts have run out from under a bridge by different lengths; the first must be held back more."""
+    """Both forecasts have run out from under a bridge: the first is held back more."""
     exit_at = 100.0
     first, second = 140.0, 105.0
     beliefs = []

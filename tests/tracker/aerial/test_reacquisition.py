@@ -25,7 +25,8 @@ DIMENSIONS = appearance.PATCH[0] * appearance.PATCH[1] * 3
 
 
 def _vehicle(rng, count=6, noise=6.0):
-    return rng.uniform(0, 255, DIMENSIONS) + rng.normal(0, noise, (count, DIMENSIONS))
+    """Return pictures (L, D) of a vehicle of one colour."""
+    return np.tile(rng.uniform(0, 255, 3), DIMENSIONS // 3) + rng.normal(0, noise, (count, DIMENSIONS))
 
 
 @given(st.integers(0, 10_000), st.integers(1, 6), st.integers(1, 6))

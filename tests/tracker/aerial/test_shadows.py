@@ -33,7 +33,7 @@ def test_what_is_left_is_vehicle_all_along_the_offset(right, down, seed):
 def test_a_rectangle_is_found_again_without_its_shadow():
     mask = np.zeros((60, 80), bool)
     for share in np.linspace(0, 1, 5):
-        y, x = int(round(20 + 4 * share)), int(round(30 + 3 * share))
+        y, x = round(20 + 4 * share), round(30 + 3 * share)
         mask[y : y + 10, x : x + 20] = True
     shadows = CastShadows()
     shadows.offset = np.array([3.0, 4.0])

@@ -37,12 +37,12 @@ def scene() -> list[np.ndarray]:
     for k in range(FRAMES):
         picture = base.copy()
         for lane, colour, behind in (*zip(LANES, COLOURS, (0, 26, 12), strict=True), (70, COLOURS[0], 40)):
-            x = int(round(40 + 1.6 * k - behind))
+            x = round(40 + 1.6 * k - behind)
             if k > 12 and x > 2:
                 cv2.rectangle(picture, (x, lane), (x + 21, lane + 9), colour, -1)
                 cv2.rectangle(picture, (x + 13, lane + 2), (x + 16, lane + 7), (20, 20, 25), -1)
         picture[:, BRIDGE[0] : BRIDGE[1]] = bridge
-        x, y = int(round(20 + 8 * np.sin(0.03 * k))), int(round(20 + 5 * np.cos(0.05 * k)))
+        x, y = round(20 + 8 * np.sin(0.03 * k)), round(20 + 5 * np.cos(0.05 * k))
         seen = picture[y : y + HEIGHT, x : x + WIDTH].astype(float) + rng.normal(0, 1.5, (HEIGHT, WIDTH, 3))
         frames.append(np.clip(seen, 0, 255).astype(np.uint8))
     return frames
@@ -53,9 +53,13 @@ def frames() -> list[np.ndarray]:
     return scene()
 
 
-def ids_in_lanes(tracker: AerialTracker, frames: list[np.ndarray]) -> tuple[dict, dict]:
+Lanes = dict[int, list[int]]
+
+
+def ids_in_lanes(tracker: AerialTracker, frames: list[np.ndarray]) -> tuple[Lanes, Lanes]:
     """Return the ids by lane of the vehicles that lead it, on both sides of the bridge."""
-    before, after = {}, {}
+    before: Lanes = {}
+    after: Lanes = {}
     tracker.start(INFO)
     for k, image in enumerate(frames):
         tracks = tracker.step(Frame(image=image, tick=k, time=k / 30.0))
@@ -67,27 +71,29 @@ def ids_in_lanes(tracker: AerialTracker, frames: list[np.ndarray]) -> tuple[dict
             x, y = 0.5 * (box[0] + box[2]) + x0, 0.5 * (box[1] + box[3]) + y0
             lane = int(np.argmin([abs(y - lane - 5) for lane in LANES]))
             if x < BRIDGE[0] - 12:
-                before.setdefault(lane, set()).add(int(number))
+                before.setdefault(lane, []).append(int(number))
             elif x > BRIDGE[1] + 12:
                 after.setdefault(lane, []).append(int(number))
-    return before, {lane: list(dict.fromkeys(numbers)) for lane, numbers in after.items()}
+    # Before the bridge who was seen last left last; behind it who was seen first came first.
+    left = {lane: list(dict.fromkeys(reversed(numbers)))[::-1] for lane, numbers in before.items()}
+    return left, {lane: list(dict.fromkeys(numbers)) for lane, numbers in after.items()}
 
 
 def test_who_passes_under_a_bridge_gets_its_id_back(frames):
     before, after = ids_in_lanes(AerialTracker(), frames)
     assert sorted(after) == [0, 1, 2]
     for lane, numbers in after.items():
-        assert set(numbers) <= before[lane]
+        assert set(numbers) <= set(before[lane])
     # Of two alike in a lane the first that went in is the first that comes out.
-    assert after[0] == sorted(after[0])
     assert len(after[0]) == 2
+    assert after[0] == [number for number in before[0] if number in after[0]]
 
 
 def test_without_re_acquisition_they_are_new(frames):
     before, after = ids_in_lanes(AerialTracker(matcher=Fusion(least=np.inf)), frames)
     assert after
     for lane, numbers in after.items():
-        assert not set(numbers) & before[lane]
+        assert not set(numbers) & set(before[lane])
 
 
 def test_the_tracker_keeps_the_contract():

@@ -62,7 +62,7 @@ class Pixel:
         self.rival, self.rivals = np.zeros(3), 0
 
     def see(self, colour, protected, low, high):
-        """Take in a colour (3,), given the bounds of its neighbours' means; return whether it is foreground."""
+        """Take in a colour (3,), given bounds of the neighbours' means; return whether it is foreground."""
         colour = np.asarray(colour, np.float32)
         if not self.support:
             self.mean, self.support = colour.copy(), 1
