@@ -29,12 +29,12 @@ LOST = 0.03
 """Chance that a vehicle that vanishes does not come back at all: it may never have been one."""
 AROUND = 1.5
 """Lengths about a new track in which a hidden vehicle that is not seen may be that one."""
-KEPT = 0.6
-"""Share of the usual covariance that is kept however well rehearsals went: it is below bridges and at
-their ends that drivers brake, and there nobody can be rehearsed."""
+SCALES = (0.6, 2.0)
+"""Bounds of what rehearsals make of the usual covariance: it is below bridges and at their ends that drivers
+brake, and there nobody can be rehearsed; and what is no vehicle is rehearsed, too."""
 RIM = 10.0
 """Px at the picture's border where nothing is sure to be seen."""
-INSIDE, ENTERING = 1e-5, 1e-4
+INSIDE, ENTERING = 6e-6, 4e-5
 """Vehicles never seen before that turn up, a px^2, inside the picture and where they come in."""
 ENTRY = 45.0
 """Px of the border where vehicles come in."""
@@ -97,7 +97,8 @@ class HiddenVehicles:
     def covariance(self, track: Track) -> Floats:
         """Return (2, 2) of a forecast, calibrated, px^2."""
         assert track.forecast is not None
-        return max(self._calibration.scale(self._tick - track.since), KEPT) * track.forecast.covariance
+        scale = np.clip(self._calibration.scale(self._tick - track.since), *SCALES)
+        return np.asarray(scale * track.forecast.covariance)
 
     def _visible(self, track: Track, to_picture: Floats, begun: Sequence[Track]) -> Floats:
         """Return (K,) the chance that a hidden vehicle is in plain view at each offset of its belief."""
