@@ -94,7 +94,7 @@ class AerialTracker:
 
     def _look(self, image: NDArray[np.uint8], to_mosaic: Floats) -> Floats:
         """Measure the tracks, begin new ones; return the boxes (M, 4) of all outlines in the picture."""
-        sure = [_box(track.corners()) for track in self._tracks if track.confirmed or track.went()]
+        sure = [_box(track.corners()) for track in self._tracks if track.went()]
         kept = np.array(sure).reshape(-1, 4)
         mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
         self._shadows.learn(self._background, mask)
