@@ -25,6 +25,11 @@ USUAL = 14.0
 """Standard deviation of a difference within a vehicle where nothing better is known, grey levels."""
 STRANGE = 40.0
 """Standard deviation of what vehicles look like, grey levels, at least."""
+SIGHT = 15.0
+"""Standard deviation of a difference between two sights of a vehicle, beyond that within one, grey levels:
+light and shadow have changed."""
+SHIFT = 1.0
+"""Cells by which the patches of two sights are usually out of line."""
 BELIEF = 6.0
 """Pictures that the pooled variance counts for."""
 
@@ -113,16 +118,27 @@ def log_ratios(pictures: Floats, hidden: list[Floats]) -> Floats:
     pooled = pool(hidden)
     within = [intra(group, pooled) for group in hidden]
     middles = np.array([group.mean(0) for group in hidden])
-    variances = np.array([gaussian.variance for gaussian in within])
+    variances = np.array([gaussian.variance for gaussian in within]) + between_sights(middles)
     strange = Gaussian(middles.mean(0), pooled + (STRANGE**2 + middles.var(0)))
     ratios = np.empty((len(hidden), len(pictures)))
     for j, picture in enumerate(pictures):
         unlike = float(strange.log_density(picture))
         squares = (picture - middles) ** 2
-        for i, (group, own) in enumerate(zip(hidden, within, strict=True)):
+        for i, group in enumerate(hidden):
+            own = Gaussian(within[i].mean, variances[i])
             # If the new vehicle were k, its differences to i would be those of k to i, as `inter` has them.
             between = 0.5 * (variances + variances[i])
             others = -0.5 * (squares / between + np.log(2.0 * np.pi * between)).mean(1)
             others[i] = unlike
             ratios[i, j] = np.median(own.log_density(picture - group)) - others.max()
     return ratios
+
+
+def between_sights(middles: Floats) -> Floats:
+    """Return the variance (N, D) that is added between two sights of vehicles with mean pictures (N, D).
+
+    A patch that is out of line changes where the picture does.
+    """
+    cells = middles.reshape(-1, PATCH[1], PATCH[0], 3)
+    beside, along = np.gradient(cells, axis=(1, 2))
+    return np.asarray(SIGHT**2 + SHIFT**2 * (along**2 + beside**2)).reshape(middles.shape)

@@ -1,9 +1,10 @@
 """The ground without its traffic: a background in the mosaic, and what differs from it.
 
 A window of the mosaic goes along with the view. Each of its pixels keeps a mean colour with its usual
-deviation, so that edges, which never lie quite still, are taken for what they are, and a rival colour. The
-rival takes over once it has been seen more often: soon where the first sight was of a vehicle, late
-elsewhere, and never below a track, since vehicles queue.
+deviation and a rival colour. A colour between those of a pixel's neighbours is nothing new: edges never lie
+quite still, and what stands above the ground shifts as the camera moves. The rival takes over once it has
+been seen more often: soon where the first sight was of a vehicle, late elsewhere, and never below a track,
+since vehicles queue.
 """
 
 from __future__ import annotations
@@ -21,8 +22,7 @@ LEAST_CHANGE = 8.0
 """Grey levels of a channel that are always noise."""
 DEVIATIONS = 2.5
 """Usual deviations that are noise."""
-AROUND = 4
-"""Half side of the patch of ground that tells the light, px."""
+NEIGHBOURS = np.ones((3, 3), np.uint8)
 RATE = 1.0 / 50.0
 NEW_SPREAD = 4.0
 """Usual deviation of a new pixel, grey levels."""
@@ -80,11 +80,14 @@ class Background:
         for box in np.round(kept - np.tile(here, 2)).astype(int).tolist():
             protected[max(box[1], 0) : max(box[3], 0), max(box[0], 0) : max(box[2], 0)] = True
         part = np.s_[y0:y1, x0:x1]
+        mean = np.ascontiguousarray(self._mean[part])
         return np.asarray(
             _compare(
                 self.laid,
                 self.valid,
                 protected,
+                cv2.erode(mean, NEIGHBOURS),
+                cv2.dilate(mean, NEIGHBOURS),
                 self._mean[part],
                 self._spread[part],
                 self._support[part],
@@ -97,12 +100,6 @@ class Background:
         """Return (h, w, 3) the background image of the view."""
         x0, y0, x1, y1 = self.view
         return np.asarray(np.round(self._mean[y0:y1, x0:x1]).astype(np.uint8))
-
-    def light(self, place: Floats) -> float:
-        """Return the grey level of the ground about a place (2,) of the mosaic, at least 20."""
-        x, y = (place - self.origin).astype(int)
-        around = self._mean[max(y - AROUND, 0) : y + AROUND + 1, max(x - AROUND, 0) : x + AROUND + 1]
-        return max(float(around.mean()), 20.0) if around.size else 100.0
 
     def _go_along(self, corners: Floats) -> None:
         """Move the window if the view leaves it."""
@@ -137,7 +134,7 @@ class Background:
 
 
 @njit(cache=True)
-def _compare(laid, valid, protected, mean, spread, support, rival, rivals):  # type: ignore[no-untyped-def]
+def _compare(laid, valid, protected, low, high, mean, spread, support, rival, rivals):  # type: ignore[no-untyped-def]
     """Return the foreground (h, w) and learn in place; see `Background`."""
     height, width = valid.shape
     found = np.zeros((height, width), np.bool_)
@@ -153,7 +150,7 @@ def _compare(laid, valid, protected, mean, spread, support, rival, rivals):  # t
             most, other = np.float32(0.0), np.float32(0.0)
             for c in range(3):
                 now = np.float32(laid[i, j, c])
-                most = max(most, abs(now - mean[i, j, c]))
+                most = max(most, now - high[i, j, c], low[i, j, c] - now)
                 other = max(other, abs(now - np.float32(rival[i, j, c])))
             change = LEAST_CHANGE + DEVIATIONS * spread[i, j]
             if most <= change:

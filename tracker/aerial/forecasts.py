@@ -29,9 +29,9 @@ class Growth:
         idle: Px a frame that even a standing vehicle may have gone.
     """
 
-    start: float = 1.5
-    along: float = 0.16
-    across: float = 0.035
+    start: float = 2.0
+    along: float = 0.2
+    across: float = 0.05
     idle: float = 0.1
 
     def covariance(self, heading: Floats, way: float, lead: float) -> Floats:

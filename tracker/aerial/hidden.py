@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.aerial.appearance import PATCH
+from tracker.aerial.belief import OFFSETS, Belief, deviations
 from tracker.aerial.calibration import Calibration
 from tracker.aerial.forecasts import Forecaster
 from tracker.aerial.occluders import Occluders
@@ -18,21 +21,23 @@ Floats = NDArray[np.float64]
 
 LONGEST = 12.0
 """Seconds after which a hidden vehicle is lost."""
-DETECTION = 0.95
-"""Chance that a vehicle in plain view is found."""
-GIVEN_UP = 0.2
+GIVEN_UP = 0.02
 """Chance of not having been seen below which a hidden vehicle is taken to have gone elsewhere ..."""
 PATIENCE = 45
 """... once it has been so low for so many frames."""
+LOST = 0.03
+"""Chance that a vehicle that vanishes does not come back at all: it may never have been one."""
+AROUND = 1.5
+"""Lengths about a new track in which a hidden vehicle that is not seen may be that one."""
+SCALES = (0.6, 2.0)
+"""Bounds of what rehearsals make of the usual covariance: it is below bridges and at their ends that drivers
+brake, and there nobody can be rehearsed; and what is no vehicle is rehearsed, too."""
 RIM = 10.0
 """Px at the picture's border where nothing is sure to be seen."""
-INSIDE, ENTERING = 2e-5, 5e-4
+INSIDE, ENTERING = 6e-6, 4e-5
 """Vehicles never seen before that turn up, a px^2, inside the picture and where they come in."""
 ENTRY = 45.0
 """Px of the border where vehicles come in."""
-SIGMA = np.array([0.0, 0.7, -0.7, 1.5, -1.5])
-"""Places along the longer axis of a forecast's ellipse, in standard deviations, and how they are weighed."""
-WEIGHTS = np.array([0.3, 0.22, 0.22, 0.13, 0.13])
 
 
 class HiddenVehicles:
@@ -51,7 +56,9 @@ class HiddenVehicles:
         self._calibration = Calibration(forecaster)
         self._size = np.array([width, height], float)
         self._longest = round(LONGEST * rate)
+        self._tick = 0
         self._unlikely: dict[int, int] = {}
+        self._beliefs: dict[int, Belief] = {}
 
     def rehearse(self, trajectories: Trajectories, tick: int, seen: list[int]) -> None:
         """Let the calibration learn from what is seen."""
@@ -61,48 +68,63 @@ class HiddenVehicles:
         """Take in a track that is no longer seen."""
         track.forecast = self._forecaster(trajectories, track.id)
         self.tracks.append(track)
+        self._unlikely[track.id], self._beliefs[track.id] = 0, Belief()
 
-    def step(self, tick: int, to_mosaic: Floats) -> None:
-        """Advance all forecasts, and give up who should have been seen, or has been away for too long."""
+    def step(self, tick: int, to_mosaic: Floats, begun: Sequence[Track]) -> None:
+        """Advance all forecasts, and give up who should have been seen, or has been away for too long.
+
+        Args:
+            tick: Of the frame.
+            to_mosaic: (3, 3).
+            begun: Tracks of which it is not yet decided who they are.
+        """
         left = []
+        self._tick = tick
+        to_picture = inverse(to_mosaic)
         for track in self.tracks:
             assert track.forecast is not None
             track.forecast.step(tick)
             turn_to_velocity(track)
-            low = self.unseen(track, to_mosaic) < GIVEN_UP
-            self._unlikely[track.id] = self._unlikely.get(track.id, 0) + 1 if low else 0
+            belief = self._beliefs[track.id]
+            belief.miss(self._visible(track, to_picture, begun))
+            self._unlikely[track.id] = self._unlikely[track.id] + 1 if belief.unseen < GIVEN_UP else 0
             if tick - track.since <= self._longest and self._unlikely[track.id] <= PATIENCE:
                 left.append(track)
             else:
-                del self._unlikely[track.id]
+                self._forget(track.id)
         self.tracks = left
 
     def covariance(self, track: Track) -> Floats:
         """Return (2, 2) of a forecast, calibrated, px^2."""
         assert track.forecast is not None
-        lead = max(track.misses, 1)
-        return self._calibration.scale(lead) * track.forecast.covariance
+        scale = np.clip(self._calibration.scale(self._tick - track.since), *SCALES)
+        return np.asarray(scale * track.forecast.covariance)
 
-    def unseen(self, track: Track, to_mosaic: Floats) -> float:
-        """Return the chance that a hidden vehicle, if it is there still, is not to be seen now."""
-        values, axes = np.linalg.eigh(self.covariance(track))
-        places = track.centre + np.outer(SIGMA * np.sqrt(values[1]), axes[:, 1])
-        shown = transform(inverse(to_mosaic), places)
+    def _visible(self, track: Track, to_picture: Floats, begun: Sequence[Track]) -> Floats:
+        """Return (K,) the chance that a hidden vehicle is in plain view at each offset of its belief."""
+        along, _ = deviations(track.heading, self.covariance(track))
+        places = track.centre + np.outer(OFFSETS * along, track.heading)
+        shown = transform(to_picture, places)
         framed = ((shown > RIM) & (shown < self._size - RIM)).all(1)
-        return 1.0 - DETECTION * float(WEIGHTS @ (framed * self.occluders.visible(places, track.heading)))
+        for other in begun:
+            framed &= np.hypot(*(places - other.centre).T) > AROUND * max(track.size[0], other.size[0])
+        return np.asarray(framed * self.occluders.visible(places, track.heading))
+
+    def _forget(self, number: int) -> None:
+        del self._unlikely[number], self._beliefs[number]
 
     def reacquire(self, new: list[Track], to_mosaic: Floats) -> list[tuple[Track, Track]]:
         """Return pairs of a hidden track and the new one that is the same vehicle; the hidden are let go."""
         if not new or not self.tracks:
             return []
+        centres = np.array([track.centre for track in new])
         none = np.zeros((0, PATCH[0] * PATCH[1] * 3))
         hidden = Hidden(
             centres=np.array([track.centre for track in self.tracks]),
             covariances=np.array([self.covariance(track) for track in self.tracks]) + np.eye(2),
             pictures=[np.array(track.pictures) if track.pictures else none for track in self.tracks],
-            unseen=np.array([self.unseen(track, to_mosaic) for track in self.tracks]),
+            densities=np.array([self._density(track, centres) for track in self.tracks]),
         )
-        centres = np.array([track.centre for track in new])
         shown = transform(inverse(to_mosaic), centres)
         border = np.minimum(shown, self._size - shown).min(1)
         appeared = Appeared(
@@ -115,5 +137,12 @@ class HiddenVehicles:
         gone = {old.id for old, _ in pairs}
         self.tracks = [track for track in self.tracks if track.id not in gone]
         for number in gone:
-            self._unlikely.pop(number, None)
+            self._forget(number)
         return pairs
+
+    def _density(self, track: Track, points: Floats) -> Floats:
+        """Return (M,) log densities, a px^2, at points (M, 2), of a hidden vehicle that may be lost."""
+        belief = self._beliefs[track.id]
+        covariance = self.covariance(track) + np.eye(2)
+        still = np.log(belief.unseen / (belief.unseen + LOST))
+        return np.asarray(still + belief.log_density(points, track.centre, track.heading, covariance))

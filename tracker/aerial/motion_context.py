@@ -46,11 +46,11 @@ class ContextParameters:
     most: float = 10.0
     slack: float = 0.3
     path: float = 0.7
-    reach: float = 60.0
+    reach: float = 120.0
     nearness: float = 0.25
     predictors: int = 7
     fewest: int = 1
-    ridge: float = 25.0
+    ridge: float = 400.0
     paced: bool = True
     search_every: int = 5
 
@@ -72,6 +72,8 @@ FASTEST = 1.6
 """Greatest pace, and one over the least."""
 STILL = 4.0
 """Px in F frames below which a section has no pace."""
+SAME_WAY = 0.9
+"""Cosine of the angle between the ways of two sections: slow vehicles on a bridge end near those below."""
 ANCHOR = 9
 """Points through which a line gives the last seen position."""
 BACK = np.arange(1.0 - ANCHOR, 1.0)
@@ -129,7 +131,7 @@ class ContextForecast:
         section, self._tick = last_section(trajectories, track, self._parameters.window)
         self._began = self._base = self._tick
         self.point = self._base_point = drift(section[-ANCHOR:])[0]
-        self.velocity = drift(section[-self._parameters.window // 2 :])[1]
+        self.velocity = drift(section)[1]
         self._section = section
         self._way = 0.0
         self._earlier = np.zeros((2, 2))
@@ -229,6 +231,8 @@ class ContextForecast:
             if ids[row] in used:
                 continue
             guide = self._guide(ids[row], int(ends[row]))
+            if guide is None:
+                continue
             if guide.tick(1) <= self._trajectories.extent(guide.track)[1] + (guide.pace == 1.0):
                 more.append(guide)
                 used.add(guide.track)
@@ -236,8 +240,8 @@ class ContextForecast:
             self._begin(self.guides)
             self.guides += more
 
-    def _guide(self, track: int, end: int) -> Guide:
-        """Make a predictor of the section that ends with a track's point ``end``."""
+    def _guide(self, track: int, end: int) -> Guide | None:
+        """Make a predictor of the section that ends with a point ``end``; None if it goes another way."""
         first, last = self._trajectories.extent(track)
         begin = float(first + end)
         if not self._parameters.paced:
@@ -248,6 +252,8 @@ class ContextForecast:
         length = float(np.hypot(*theirs))
         if min(length, float(np.hypot(*ours))) < STILL:
             return Guide(track, begin, 1.0, 1.0)
+        if unit(theirs) @ unit(ours) < SAME_WAY:
+            return None
         # Side by side with the forecast, between two ticks if need be: where the road bends that is what
         # counts.
         ahead = np.clip(float((self.point - stop) @ theirs) / length**2 * (window - 1), -3, 3)

@@ -11,8 +11,8 @@ Floats = NDArray[np.float64]
 
 CELL = 8.0
 """Side of a cell, px."""
-SEEN, HIDDEN = 1.0, 1.0
-"""Frames with a vehicle in view, and with one that is not, that a new cell is taken to have had."""
+DOUBT = 1.0
+"""Frames with a vehicle that is not in view that a new cell is taken to have had."""
 MEMORY = 200.0
 """Frames after which what a cell has shown begins to fade: bridges shift as the camera moves."""
 
@@ -38,10 +38,10 @@ class Occluders:
         self._count(points, headings, 1)
 
     def visible(self, points: ArrayLike, headings: ArrayLike) -> Floats:
-        """Return (K,) the chance that a vehicle at each of (K, 2) can be seen, as far as objects go."""
+        """Return (K,) the chance that a vehicle at each of (K, 2) can be seen, 0 where nothing is known."""
         unknown = np.array([0.0, 0.0])
         seen = np.array([self._cells.get(cell, unknown) for cell in _cells(points, headings)]).reshape(-1, 2)
-        return np.asarray((SEEN + seen[:, 0]) / (SEEN + HIDDEN + seen.sum(1)))
+        return np.asarray(seen[:, 0] / (DOUBT + seen.sum(1)))
 
     def _count(self, points: ArrayLike, headings: ArrayLike, kind: int) -> None:
         for cell in dict.fromkeys(_cells(points, headings)):

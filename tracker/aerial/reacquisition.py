@@ -1,8 +1,7 @@
 """Which hidden vehicle a new one is, or none: motion and appearance in one log likelihood ratio.
 
 Every hidden vehicle may stay hidden, and every new one may never have been seen before: the assignment has a
-place for 'none of them' in each row, at the price of how unlikely it is that the vehicle is still out of
-sight.
+place for 'none of them' in each row.
 """
 
 from __future__ import annotations
@@ -27,13 +26,13 @@ class Hidden:
         centres: (N, 2) where they are expected, px.
         covariances: (N, 2, 2) px^2.
         pictures: N arrays (L, D) of what they looked like.
-        unseen: (N,) chance that such a vehicle has not been seen until now, if it is none of the new ones.
+        densities: (N, M) log of each one's density, a px^2, where the new vehicles are.
     """
 
     centres: Floats
     covariances: Floats
     pictures: list[Floats]
-    unseen: Floats
+    densities: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,22 +71,21 @@ class Fusion:
     """
 
     motion: bool = True
-    looks: float = 12.0
-    most: float = 6.0
+    looks: float = 8.0
+    most: float = 4.0
     gate: float = 16.0
     least: float = 0.0
 
     def __call__(self, hidden: Hidden, new: Appeared) -> tuple[Indices, Indices]:
         """Return rows of ``hidden`` and columns of ``new`` that are the same vehicles."""
-        squared, sizes = distances(hidden, new)
+        squared = distances(hidden, new)
         ratios = np.zeros_like(squared)
         if self.motion:
-            ratios += -0.5 * (squared + sizes[:, None]) - np.log(2.0 * np.pi * new.strangers)
+            ratios += hidden.densities - np.log(new.strangers)
         if self.looks:
             near = np.flatnonzero((squared <= self.gate).any(1))
             looks = appearance.log_ratios(new.pictures, [hidden.pictures[i] for i in near])
             ratios[near] += np.clip(self.looks * looks, -self.most, self.most)
-        ratios -= np.log(np.maximum(hidden.unseen, 1e-3))[:, None]
         return best(np.where(squared <= self.gate, ratios, -np.inf), self.least)
 
 
@@ -129,11 +127,11 @@ class Nearest:
         return assign(away, self.reach)
 
 
-def distances(hidden: Hidden, new: Appeared) -> tuple[Floats, Floats]:
-    """Return (N, M) squared Mahalanobis distances, and (N,) the log determinants of the covariances."""
+def distances(hidden: Hidden, new: Appeared) -> Floats:
+    """Return (N, M) squared Mahalanobis distances of the new vehicles from the forecasts."""
     apart = new.centres[None] - hidden.centres[:, None]
     solved = np.linalg.solve(hidden.covariances[:, None], apart[..., None])[..., 0]
-    return (apart * solved).sum(-1), np.linalg.slogdet(hidden.covariances)[1]
+    return np.asarray((apart * solved).sum(-1))
 
 
 def best(ratios: Floats, least: float) -> tuple[Indices, Indices]:

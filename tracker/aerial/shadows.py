@@ -2,18 +2,20 @@
 
 Pixel by pixel a dark roof and a shadow are the same. But where a vehicle is bright its shadow can be told
 from it (`tracker.motorcycle_lane.shadows`), and all vehicles have one sun: the offset that is learnt from
-bright ones is taken off every outline.
+bright ones is taken off the whole foreground.
 """
 
 from __future__ import annotations
 
 from collections import deque
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.aerial.background import Background
-from tracker.aerial.measuring import Labels, Outlines
+from tracker.aerial.measuring import Labels
+from tracker.motorcycle_lane.blobs import find_blobs
 from tracker.motorcycle_lane.shadows import Shadows
 
 Floats = NDArray[np.float64]
@@ -24,8 +26,8 @@ BRIGHT = (0.3, 0.9)
 """Share of a region that is no shadow, where it tells of the offset."""
 LEAST_AREA = 60
 ENOUGH, MEMORY = 8, 120
-MOST = 0.45
-"""Share of an outline that a shadow takes at most."""
+LONGEST = 6.0
+"""Px of the longest shadow that is taken off."""
 
 
 class CastShadows:
@@ -41,11 +43,13 @@ class CastShadows:
         self._offsets: deque[Floats] = deque(maxlen=MEMORY)
         self._frame = 0
 
-    def learn(self, background: Background, labels: Labels, count: int) -> None:
-        """Learn from the regions 1 to ``count`` (H, W) of the last picture on the background."""
+    def learn(self, background: Background, mask: NDArray[np.bool_]) -> None:
+        """Learn from the foreground (H, W) of the last picture on the background."""
         self._frame += 1
-        if self._frame % EVERY or not count:
+        if self._frame % EVERY:
             return
+        blobs = find_blobs(mask, LEAST_AREA)
+        labels, count = blobs.labels, len(blobs)
         lit = np.nonzero(self._shadows.remove(background.laid, background.picture(), labels > 0))
         everything = np.nonzero(labels)
         whole, bright = _sums(labels, everything, count), _sums(labels, lit, count)
@@ -53,26 +57,19 @@ class CastShadows:
         for k in np.flatnonzero((whole[:, 0] >= LEAST_AREA) & (share > BRIGHT[0]) & (share < BRIGHT[1])):
             self._offsets.append(2.0 * (whole[k, 1:] / whole[k, 0] - bright[k, 1:] / bright[k, 0]))
         if len(self._offsets) >= ENOUGH:
-            self.offset = np.median(np.array(self._offsets), axis=0)
+            offset = np.median(np.array(self._offsets), axis=0)
+            self.offset = offset * min(1.0, LONGEST / max(float(np.hypot(*offset)), 1e-9))
 
-    def cast(self, centres: Floats, headings: Floats, sizes: Floats) -> tuple[Floats, Floats]:
-        """Return centres and sizes (N, 2) of vehicles together with their shadows."""
-        return centres + 0.5 * self.offset, sizes + self._lengths(headings)
-
-    def lift(self, outlines: Outlines) -> Outlines:
-        """Return outlines without the shadows."""
-        sizes = np.maximum(outlines.sizes - self._lengths(outlines.headings), (1.0 - MOST) * outlines.sizes)
-        return Outlines(
-            centres=outlines.centres - 0.5 * self.offset,
-            headings=outlines.headings,
-            sizes=sizes,
-            pixels=outlines.pixels,
-        )
-
-    def _lengths(self, headings: Floats) -> Floats:
-        """Return (N, 2) how far a shadow reaches along and across headings, px."""
-        across = headings[:, ::-1] * np.array([-1.0, 1.0])
-        return np.asarray(np.abs(np.column_stack([headings @ self.offset, across @ self.offset])))
+    def take_off(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return a foreground (H, W) without the shadows: what is vehicle all along the offset from there."""
+        reach = np.round(self.offset).astype(int)
+        steps = int(np.abs(reach).max())
+        if not steps:
+            return mask
+        ways = np.round(np.linspace(0.0, 1.0, steps + 1)[:, None] * reach).astype(int)
+        kernel = np.zeros((2 * steps + 1, 2 * steps + 1), np.uint8)
+        kernel[steps + ways[:, 1], steps + ways[:, 0]] = 1
+        return np.asarray(cv2.erode(mask.view(np.uint8), kernel, borderValue=1).view(np.bool_))
 
 
 def _sums(labels: Labels, at: tuple[NDArray[np.intp], ...], count: int) -> Floats:

@@ -32,15 +32,18 @@ LEAST_AREA = 30
 BORDER = 3.0
 """Px from the picture's border within which an outline is cut off."""
 MOVED = 0.5
-"""Lengths that a track must have gone to be confirmed: what only seems to move does not go far."""
+"""Lengths, its own or usual ones, that a track must have gone to be confirmed: what only seems to move
+does not go far."""
 COMPACT = 0.6
 """Share of a rectangle that is foreground where a track begins: what is less may be two vehicles."""
 ENOUGH = 5
 """Vehicles whose median size is the usual one."""
+SMALLEST = np.array([0.5, 0.5])
+"""Length and width, in usual ones, from which on a region may be a vehicle's."""
 LARGEST = np.array([1.4, 1.5])
 """Length and width of a region, in usual ones, up to which it is one vehicle's."""
-USUAL_LIGHT = 100.0
-"""Grey level of the ground to which pictures are scaled: a shadow darkens vehicles and road."""
+LEAST_HISTORY = 20
+"""Frames that a track must have been measured to be forecast once it vanishes."""
 GOES = 8.0
 """Px in `WINDOW` frames from which on a track is rehearsed."""
 
@@ -68,6 +71,7 @@ class AerialTracker:
         self._hidden = HiddenVehicles(self._forecaster, self._matcher, info.width, info.height, info.rate)
         self._ids = itertools.count(1)
         self._tick = -1
+        self._usual = np.zeros(2)
         self._diagnostics = Diagnostics()
 
     @property
@@ -84,26 +88,25 @@ class AerialTracker:
         seen = self._look(image, to_mosaic)
         self._remember(image, to_mosaic)
         self._hide()
-        self._hidden.step(self._tick, to_mosaic)
+        self._hidden.step(self._tick, to_mosaic, [track for track in self._tracks if not track.confirmed])
         self._decide(to_mosaic)
         return self._shown(to_mosaic, seen)
 
     def _look(self, image: NDArray[np.uint8], to_mosaic: Floats) -> Floats:
         """Measure the tracks, begin new ones; return the boxes (M, 4) of all outlines in the picture."""
-        kept = np.array([_box(track.corners()) for track in self._tracks if track.went()]).reshape(-1, 4)
+        sure = [_box(track.corners()) for track in self._tracks if track.went()]
+        kept = np.array(sure).reshape(-1, 4)
         mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
-        blobs = find_blobs(mask, LEAST_AREA // 2)
+        self._shadows.learn(self._background, mask)
+        blobs = find_blobs(self._shadows.take_off(mask), LEAST_AREA // 2)
         origin = self._background.origin + np.array(self._background.view[:2])
         places = np.array([track.state[:, 0] for track in self._tracks]).reshape(-1, 2) - origin
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
         sizes = np.array([track.size for track in self._tracks]).reshape(-1, 2)
-        self._shadows.learn(self._background, blobs.labels, len(blobs))
         senior = np.array([track.confirmed for track in self._tracks], np.bool_)
-        expected, wide = self._shadows.cast(places, headings, sizes)
-        own, beaten, left = outline(blobs.labels, self._single(blobs), senior, expected, headings, wide)
-        own = self._shadows.lift(own)
+        own, beaten, left = outline(blobs.labels, self._single(blobs), senior, places, headings, sizes)
         rest = find_blobs(left > 0, LEAST_AREA)
-        free = self._shadows.lift(free_outlines(rest.labels, len(rest)))
+        free = free_outlines(rest.labels, len(rest))
         to_picture = inverse(to_mosaic)
         cut = self._cut_off(transform(to_picture, own.corners() + origin))
         for k, track in enumerate(self._tracks):
@@ -119,7 +122,8 @@ class AerialTracker:
         for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
             tracks.measure(missed[i], free.centres[j], free.sizes[j], self._tick, bool(cut[j]))
         compact = free.pixels >= COMPACT * free.sizes.prod(1)
-        for j in np.setdiff1d(np.flatnonzero(compact & (free.pixels > 0)), columns).tolist():
+        large = (free.sizes >= SMALLEST * self._usual).all(1)
+        for j in np.setdiff1d(np.flatnonzero(compact & large & (free.pixels > 0)), columns).tolist():
             self._tracks.append(tracks.begin(next(self._ids), free, j, self._tick))
         found = np.concatenate([own.corners()[own.pixels > 0] + origin, free.corners()])
         return _boxes(transform(to_picture, found))
@@ -128,7 +132,9 @@ class AerialTracker:
         """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of the known."""
         sizes = free_outlines(blobs.labels, len(blobs)).sizes
         known = np.array([track.size for track in self._tracks if track.confirmed and track.whole])
-        usual = np.median(known if len(known) > ENOUGH else sizes, axis=0) if len(sizes) else np.zeros(2)
+        if len(known) > ENOUGH:
+            self._usual = np.median(known, axis=0)
+        usual = self._usual if self._usual.any() or not len(sizes) else np.median(sizes, axis=0)
         return np.append(False, (sizes <= usual * LARGEST).all(1))
 
     def _remember(self, image: NDArray[np.uint8], to_mosaic: Floats) -> None:
@@ -146,7 +152,7 @@ class AerialTracker:
                 picture = appearance.cut(
                     image, middle, turn @ (half[0] * track.heading), turn @ (half[1] * across)
                 )
-                track.pictures.append(picture * (USUAL_LIGHT / self._background.light(track.centre)))
+                track.pictures.append(picture)
         if whole:
             self._hidden.occluders.see(
                 np.array([track.centre for track in whole]), np.array([track.heading for track in whole])
@@ -165,7 +171,12 @@ class AerialTracker:
     def _hide(self) -> None:
         """End what was not found again; of what was a vehicle for sure a forecast is begun."""
         for track in self._tracks:
-            if track.misses >= tracks.MOST_MISSES and track.confirmed and track.id in self._trajectories:
+            if (
+                track.misses >= tracks.MOST_MISSES
+                and track.confirmed
+                and track.hits >= LEAST_HISTORY
+                and track.id in self._trajectories
+            ):
                 self._hidden.add(track, self._trajectories)
         self._tracks = [track for track in self._tracks if track.misses < tracks.MOST_MISSES]
 
@@ -178,7 +189,7 @@ class AerialTracker:
             and track.whole
             and track.hits >= tracks.CONFIRMING_HITS
             and track.pictures
-            and track.went(MOVED)
+            and track.went(MOVED * max(1.0, self._usual[0] / track.size[0]))
         ]
         for old, track in self._hidden.reacquire(new, to_mosaic):
             self._join(old, track)

@@ -26,13 +26,21 @@ GATE = 12.0
 """Squared Mahalanobis distance of a free region that a track may take."""
 WHOLE = 0.82
 """Share of a vehicle's length that must be measured for it to be in full view."""
+GROWN = 1.1
+"""Share of the length above which more of a vehicle comes into view."""
+PART = 4.0
+"""Standard deviation of the place along the way of a vehicle that is seen in part, px."""
+LEAST_PART, BESIDE = 0.25, 0.5
+"""Share of a vehicle's area that is a part of it, and of its width by which that may lie beside."""
 CONFIRMING_HITS = 6
+SETTLED = 25
+"""Frames after which the size and heading of a confirmed track are known."""
 MOST_MISSES = 2
 """Successive misses after which a confirmed track is hidden, and any other one ends."""
 SLOWEST = 0.25
 """Px a frame below which a heading is kept as it was."""
-GROW, SHRINK = 0.3, 0.04
-"""How fast the size follows larger and smaller outlines."""
+GROW, SHRINK, NEW = 0.15, 0.1, 0.3
+"""How fast the size follows larger and smaller outlines, and those of a track that is not settled."""
 PICTURE_EVERY = 4
 
 
@@ -135,29 +143,37 @@ def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool
         Whether it was taken; what lies too far off is another vehicle's, as where one drives on a bridge.
     """
     across = track.heading[::-1] * np.array([-1.0, 1.0])
-    track.whole = bool(size[0] >= WHOLE * track.size[0]) and not blocked
+    full = WHOLE * track.size[0] <= size[0] <= GROWN * track.size[0] + 1.0
+    track.whole = bool(full) and not blocked
     apart = np.array([(centre - track.state[:, 0]) @ axis for axis in (track.heading, across)])
-    if not track.whole and track.hits > 3:
-        for axis in range(2):
-            missing = 0.5 * max(track.size[axis] - size[axis], 0.0)
-            # The middle of the whole, if its front, or its rear, is what is measured.
-            candidates = np.array([apart[axis] - missing, apart[axis] + missing])
-            apart[axis] = candidates[np.abs(candidates).argmin()]
-    at = track.state[:, 0] + apart[0] * track.heading + apart[1] * across
-    noise = NOISE**2 if track.whole else (3.0 * NOISE) ** 2
-    if track.confirmed:
-        squared = float(((at - track.state[:, 0]) ** 2 / (track.spread[:, 0, 0] + noise)).sum())
+    settled = track.confirmed and track.hits > SETTLED
+    if settled and not track.whole:
+        if not _is_part(track, apart, size):
+            return False
+        # The middle of the whole, if its front, or its rear, is what is measured; beside it is where it was.
+        missing = 0.5 * max(track.size[0] - size[0], 0.0)
+        candidates = np.array([apart[0] - missing, apart[0] + missing])
+        ahead = candidates[np.abs(candidates).argmin()]
+        at = track.state[:, 0] + ahead * track.heading
+        kalman.update(track.state, track.spread, np.arange(2), at, PART**2)
+        track.hits, track.misses, track.since = track.hits + 1, 0, tick
+        return True
+    if settled:
+        squared = float(((centre - track.state[:, 0]) ** 2 / (track.spread[:, 0, 0] + NOISE**2)).sum())
         if squared > GATE:
             return False
-    kalman.update(track.state, track.spread, np.arange(2), at, noise)
-    if track.whole or track.hits <= 3:
-        rate = np.where(size > track.size, GROW, SHRINK if track.hits > 3 else GROW)
-        track.size = np.maximum(track.size + rate * (size - track.size), 4.0)
-    else:
-        track.size = np.where(size > track.size, track.size + GROW * (size - track.size), track.size)
+    kalman.update(track.state, track.spread, np.arange(2), centre, NOISE**2)
+    rate = np.where(size > track.size, GROW, SHRINK) if settled else np.full(2, NEW)
+    track.size = np.maximum(track.size + rate * (size - track.size), 4.0)
     track.hits, track.misses, track.since = track.hits + 1, 0, tick
     turn_to_velocity(track)
     return True
+
+
+def _is_part(track: Track, apart: Floats, size: Floats) -> bool:
+    """Tell whether an outline, ``apart`` (2,) along and across, may be a part of a vehicle."""
+    covered = float(size.prod() / track.size.prod())
+    return covered > LEAST_PART and abs(float(apart[1])) < BESIDE * float(track.size[1])
 
 
 def turn_to_velocity(track: Track) -> None:

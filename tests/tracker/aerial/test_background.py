@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.tracker.aerial.twin import Pixel
-from tracker.aerial.background import LATE, Background, _compare
+from tracker.aerial.background import LATE, NEIGHBOURS, Background, _compare
 
 NONE = np.zeros((0, 4))
 
@@ -28,10 +29,14 @@ def test_every_pixel_is_learnt_as_by_itself(seed):
         laid = np.take_along_axis(colours, which[k][None, ..., None], 0)[0]
         laid = np.clip(laid + rng.integers(-6, 7, laid.shape), 0, 255).astype(np.uint8)
         valid, protected = rng.random((height, width)) < 0.9, rng.random((height, width)) < 0.3
-        found = _compare(laid, valid, protected, mean, spread, support, rival, rivals)
+        low, high = cv2.erode(mean, NEIGHBOURS), cv2.dilate(mean, NEIGHBOURS)
+        found = _compare(laid, valid, protected, low, high, mean, spread, support, rival, rivals)
         for i, j in np.ndindex(height, width):
-            plain = pixels[i][j].see(laid[i, j], protected[i, j]) if valid[i, j] else False
-            assert found[i, j] == plain
+            if valid[i, j]:
+                plain = pixels[i][j].see(laid[i, j], protected[i, j], low[i, j], high[i, j])
+                assert found[i, j] == plain
+            else:
+                assert not found[i, j]
     for i, j in np.ndindex(height, width):
         assert np.allclose(mean[i, j], pixels[i][j].mean, atol=1e-2)
         assert np.isclose(spread[i, j], pixels[i][j].spread, atol=1e-3)
@@ -85,11 +90,9 @@ def test_a_vehicle_that_stands_becomes_ground_unless_a_track_is_on_it():
         assert found[-1] != gone
 
 
-def test_light_is_the_grounds():
-    background = Background()
-    grey = np.full((60, 80, 3), 90, np.uint8)
-    for _ in range(3):
-        background.apply(grey, np.eye(3), NONE)
-    assert abs(background.light(np.array([40.0, 30.0])) - 90.0) < 1e-3
-    background.apply(grey, np.eye(3), NONE)
-    assert background.light(np.array([-9e3, 0.0])) == 100.0
+def test_edges_that_shift_by_a_pixel_are_nothing_new():
+    background, ground = Background(), picture()
+    for _ in range(10):
+        background.apply(ground, np.eye(3), NONE)
+    assert not background.apply(np.roll(ground, 1, axis=1), np.eye(3), NONE)[:, 3:-3].any()
+    assert background.apply(np.roll(ground, 4, axis=1), np.eye(3), NONE).any()

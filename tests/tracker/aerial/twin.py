@@ -61,13 +61,14 @@ class Pixel:
         self.mean, self.spread, self.support = np.zeros(3, np.float32), np.float32(NEW_SPREAD), 0
         self.rival, self.rivals = np.zeros(3), 0
 
-    def see(self, colour, protected):
-        """Take in a colour (3,); return whether it is foreground."""
+    def see(self, colour, protected, low, high):
+        """Take in a colour (3,), given bounds of the neighbours' means; return whether it is foreground."""
         colour = np.asarray(colour, np.float32)
         if not self.support:
             self.mean, self.support = colour.copy(), 1
             return False
-        apart, change = np.abs(colour - self.mean).max(), LEAST_CHANGE + DEVIATIONS * self.spread
+        apart = np.maximum(np.maximum(colour - high, low - colour), 0).max()
+        change = LEAST_CHANGE + DEVIATIONS * self.spread
         if apart <= change:
             self.support, self.rivals = min(self.support + 1, LATE), max(self.rivals - 1, 0)
             self.mean = self.mean + np.float32(max(1 / self.support, RATE)) * (colour - self.mean)

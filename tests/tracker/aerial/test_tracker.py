@@ -1,0 +1,100 @@
+"""The whole tracker on a drawn scene: vehicles on a textured ground pass under a bridge."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from tracker.aerial.reacquisition import Fusion
+from tracker.aerial.tracker import AerialTracker
+from tracker.base import check_tracker
+from tracker.types import Frame, Info, Status
+
+WIDTH, HEIGHT, FRAMES = 320, 240, 170
+INFO = Info(width=WIDTH, height=HEIGHT, rate=30.0, intrinsics=None)
+BRIDGE = (150, 200)
+LANES = (70, 120, 170)
+COLOURS = ((210, 40, 40), (235, 235, 235), (40, 60, 200))
+"""Of the vehicle in each lane; in the first one more, alike, follows."""
+
+
+def ground() -> np.ndarray:
+    rng = np.random.default_rng(4)
+    picture = rng.integers(90, 130, (HEIGHT + 80, WIDTH + 80, 3)).astype(np.uint8)
+    picture = cv2.GaussianBlur(picture, (5, 5), 1.5)
+    for _ in range(250):
+        corner = rng.integers(0, [WIDTH + 80, HEIGHT + 80])
+        end = corner + rng.integers(4, 16, 2)
+        cv2.rectangle(picture, corner.tolist(), end.tolist(), rng.integers(70, 150, 3).tolist(), -1)
+    return picture
+
+
+def scene() -> list[np.ndarray]:
+    """Draw the frames: the camera drifts, the vehicles drive to the right at 1.6 px a frame."""
+    base, rng, frames = ground(), np.random.default_rng(5), []
+    bridge = np.random.default_rng(6).integers(60, 100, (HEIGHT + 80, BRIDGE[1] - BRIDGE[0], 3))
+    for k in range(FRAMES):
+        picture = base.copy()
+        for lane, colour, behind in (*zip(LANES, COLOURS, (0, 26, 12), strict=True), (70, COLOURS[0], 40)):
+            x = round(40 + 1.6 * k - behind)
+            if k > 12 and x > 2:
+                cv2.rectangle(picture, (x, lane), (x + 21, lane + 9), colour, -1)
+                cv2.rectangle(picture, (x + 13, lane + 2), (x + 16, lane + 7), (20, 20, 25), -1)
+        picture[:, BRIDGE[0] : BRIDGE[1]] = bridge
+        x, y = round(20 + 8 * np.sin(0.03 * k)), round(20 + 5 * np.cos(0.05 * k))
+        seen = picture[y : y + HEIGHT, x : x + WIDTH].astype(float) + rng.normal(0, 1.5, (HEIGHT, WIDTH, 3))
+        frames.append(np.clip(seen, 0, 255).astype(np.uint8))
+    return frames
+
+
+@pytest.fixture(scope="module")
+def frames() -> list[np.ndarray]:
+    return scene()
+
+
+Lanes = dict[int, list[int]]
+
+
+def ids_in_lanes(tracker: AerialTracker, frames: list[np.ndarray]) -> tuple[Lanes, Lanes]:
+    """Return the ids by lane of the vehicles that lead it, on both sides of the bridge."""
+    before: Lanes = {}
+    after: Lanes = {}
+    tracker.start(INFO)
+    for k, image in enumerate(frames):
+        tracks = tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+        y0 = 20 + 5 * np.cos(0.05 * k)
+        x0 = 20 + 8 * np.sin(0.03 * k)
+        for number, box, status in zip(tracks.ids, tracks.boxes, tracks.status, strict=True):
+            if status != Status.CONFIRMED:
+                continue
+            x, y = 0.5 * (box[0] + box[2]) + x0, 0.5 * (box[1] + box[3]) + y0
+            lane = int(np.argmin([abs(y - lane - 5) for lane in LANES]))
+            if x < BRIDGE[0] - 12:
+                before.setdefault(lane, []).append(int(number))
+            elif x > BRIDGE[1] + 12:
+                after.setdefault(lane, []).append(int(number))
+    # Before the bridge who was seen last left last; behind it who was seen first came first.
+    left = {lane: list(dict.fromkeys(reversed(numbers)))[::-1] for lane, numbers in before.items()}
+    return left, {lane: list(dict.fromkeys(numbers)) for lane, numbers in after.items()}
+
+
+def test_who_passes_under_a_bridge_gets_its_id_back(frames):
+    before, after = ids_in_lanes(AerialTracker(), frames)
+    assert sorted(after) == [0, 1, 2]
+    for lane, numbers in after.items():
+        assert set(numbers) <= set(before[lane])
+    # Of two alike in a lane the first that went in is the first that comes out.
+    assert len(after[0]) == 2
+    assert after[0] == [number for number in before[0] if number in after[0]]
+
+
+def test_without_re_acquisition_they_are_new(frames):
+    before, after = ids_in_lanes(AerialTracker(matcher=Fusion(least=np.inf)), frames)
+    assert after
+    for lane, numbers in after.items():
+        assert not set(numbers) & set(before[lane])
+
+
+def test_the_tracker_keeps_the_contract():
+    check_tracker(AerialTracker())
