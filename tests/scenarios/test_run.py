@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import cv2
 import numpy as np
@@ -127,6 +128,8 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(tmp_path):
         "--out",
         str(tmp_path / "deep" / "out"),
         start=subprocess.Popen,
+        # Who starts the tests in the background may have made them deaf to interrupts.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 60
     while not any(tmp_path.iterdir()) and time.monotonic() < deadline:

@@ -156,7 +156,7 @@ class PlainModel:
             sums, old = self.background[seen].sum(0), before[seen].sum(0)
             growth = np.where(old > 0, sums / np.maximum(old, 1e-9), 1)
             self.background[learnt] = np.minimum(self.background[learnt] * growth, 255)
-        if mask.mean() - self.calm > p.flash_share and not training:
+        if mask.mean() > self.calm + p.flash_share and not training:
             self.flashing += 1
         else:
             self.flashing, self.calm = 0, mask.mean()
