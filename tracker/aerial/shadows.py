@@ -1,7 +1,7 @@
 """Vehicles with the shadows they cast: all to one side, and most about as far.
 
 Pixel by pixel a dark roof and a shadow are the same. But where a vehicle is bright its shadow can be told
-from it (`tracker.motorcycle_lane.shadows`), and all vehicles have one sun: the offset that is learnt from
+from it (`tracker.aerial.darkening`), and all vehicles have one sun: the offset that is learnt from
 bright ones is taken off the whole foreground.
 """
 
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.aerial.background import Background
+from tracker.aerial.darkening import Shadows
 from tracker.aerial.measuring import Labels
 from tracker.motorcycle_lane.blobs import find_blobs
-from tracker.motorcycle_lane.shadows import Shadows
 
 Floats = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Sizes, silhouettes, cores and shadows: each against a plain twin, or made-up regions of known truth."""
+"""Sizes, silhouettes and cores: each against a plain twin, or made-up regions of known truth."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from tracker.motorcycle_lane import colour, measuring, silhouettes
 from tracker.motorcycle_lane.blobs import find_blobs
-from tracker.motorcycle_lane.shadows import DARKEST, REACH, Shadows, darkness
 from tracker.motorcycle_lane.sizes import SizeModel, robust_lines
 
 
@@ -133,43 +132,3 @@ def test_a_rider_that_nobody_expects_is_found_beside_one_that_is():
     assert worth > 0.6
     assert np.hypot(x - truth[1, 0], y - truth[1, 1]) < 4.0
     assert not len(silhouettes.unexplained(shape, groups, 1, window, truth, sizes, *line, 0.2, 4))
-
-
-def test_shadows_are_taken_out_and_dark_clothes_are_not():
-    rng = np.random.default_rng(1)
-    background = np.clip(120 + rng.normal(0, 12, (80, 100, 1)) + [6, 0, -6], 0, 255).astype(np.uint8)
-    picture = background.astype(float)
-    picture[40:60, 50:80] *= np.array([0.55, 0.6, 0.66])
-    picture[20:60, 35:50] = (40, 42, 45)
-    image = np.clip(picture + rng.normal(0, 2, picture.shape), 0, 255).astype(np.uint8)
-    mask = np.zeros((80, 100), bool)
-    mask[40:60, 50:80] = mask[20:60, 35:50] = True
-    before = image.copy(), background.copy(), mask.copy()
-    left = Shadows().remove(image, background, mask)
-    assert left[40:60, 52:80].mean() < 0.05
-    assert left[20:60, 35:48].mean() > 0.9
-    assert not (left & ~mask).any()
-    assert all(np.array_equal(a, b) for a, b in zip(before, (image, background, mask), strict=True))
-
-
-@given(seed=st.integers(0, 10_000))
-@settings(max_examples=15, deadline=None)
-def test_darkness_is_its_plain_twin(seed):
-    rng = np.random.default_rng(seed)
-    background = rng.integers(90, 110, (9, 11, 3)).astype(np.uint8)
-    image = (background * rng.uniform(0.4, 0.9)).astype(np.uint8)
-    mask = rng.random((9, 11)) < 0.8
-    found = darkness(image, background, mask)
-    for y, x in np.ndindex(9, 11):
-        near = np.zeros_like(mask)
-        near[max(y - REACH, 0) : y + REACH + 1, max(x - REACH, 0) : x + REACH + 1] = True
-        near &= mask
-        now, then = image[near].astype(float).sum(0), background[near].astype(float).sum(0)
-        mean = now.sum() / (then.sum() + 1.0)
-        if not mask[y, x] or mean < DARKEST:
-            assert found[y, x, 0] == 0.0
-            continue
-        red, _, blue = now / (then + 1.0)
-        ratios = (image[near].astype(float).sum(1) + 3) / (background[near].astype(float).sum(1) + 3)
-        wanted = mean, (blue - red) / mean, ratios.std() / mean
-        assert np.allclose(found[y, x], wanted, atol=1e-4)

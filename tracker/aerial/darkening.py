@@ -2,7 +2,7 @@
 
 What a shadow falls on keeps its texture and nearly its colour: over a small window the ratio to the
 background image hardly varies (Jacques, Jung, Musse, Background subtraction and shadow detection in grayscale
-video sequences, SIBGRAPI 2005). Dark clothes may do the same; but the shadows of all riders share one
+video sequences, SIBGRAPI 2005). Dark paint may do the same; but the shadows of all vehicles share one
 darkness, which is learnt as the mode of what looks like one.
 """
 
