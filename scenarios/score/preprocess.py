@@ -40,10 +40,7 @@ def select(
     truth: FrameTruth, *, width: int, height: int, boxes: Boxes = "amodal", params: ScoringParams
 ) -> Selection:
     """Decide which vehicles of an in-car frame are scored, and by which boxes."""
-    chosen = truth.box_amodal if boxes == "amodal" else truth.box_visible
-    clipped = clip(chosen, width, height)
-    present = box_area(clipped) > 0
-    clipped = np.where(present[:, None], clipped, np.nan)
+    clipped, present = _in_frame(truth, width, height, boxes)
     scored = (
         present
         & (truth.roles == Role.SAME_WAY)
@@ -58,10 +55,7 @@ def select_from_above(
     truth: FrameTruth, *, width: int, height: int, boxes: Boxes = "amodal", params: ScoringParams
 ) -> Selection:
     """Decide which vehicles of a frame from the air are scored, and by which boxes."""
-    chosen = truth.box_amodal if boxes == "amodal" else truth.box_visible
-    clipped = clip(chosen, width, height)
-    present = box_area(clipped) > 0
-    clipped = np.where(present[:, None], clipped, np.nan)
+    clipped, present = _in_frame(truth, width, height, boxes)
     scored = present & (truth.visible >= params.min_visible)
     return Selection(boxes=clipped, scored=scored, ignored=present & ~scored)
 
@@ -85,10 +79,7 @@ def select_riders(
         boxes: Which boxes are scored.
         params: Thresholds.
     """
-    chosen = truth.box_amodal if boxes == "amodal" else truth.box_visible
-    clipped = clip(chosen, width, height)
-    present = box_area(clipped) > 0
-    clipped = np.where(present[:, None], clipped, np.nan)
+    clipped, present = _in_frame(truth, width, height, boxes)
     scored = (
         present
         & (truth.visible >= params.min_visible)
@@ -96,6 +87,13 @@ def select_riders(
         & (standing < params.standing_seconds)
     )
     return Selection(boxes=clipped, scored=scored, ignored=present & ~scored)
+
+
+def _in_frame(truth: FrameTruth, width: int, height: int, boxes: Boxes) -> tuple[Floats, Mask]:
+    """Return (N, 4) the boxes in the frame, not a number where there is none, and (N,) whether there is."""
+    clipped = clip(truth.box_amodal if boxes == "amodal" else truth.box_visible, width, height)
+    present = box_area(clipped) > 0
+    return np.where(present[:, None], clipped, np.nan), present
 
 
 def clip(boxes: Floats, width: int, height: int) -> Floats:

@@ -153,7 +153,7 @@ def compare(seeds: Sequence[int], *, seconds: float, tracker: str) -> dict[str, 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Compare the two and print the paired differences."""
     parser = argparse.ArgumentParser(prog="python -m tests.validation.active_tracking")
-    parser.add_argument("--seeds", default="500:520", metavar="A:B", help="the drives A, A+1, ... B-1")
+    parser.add_argument("--seeds", default="600:620", metavar="A:B", help="the drives A, A+1, ... B-1")
     parser.add_argument("--seconds", type=float, default=12.0, help="length of a drive")
     parser.add_argument("--tracker", default="aerial", metavar="NAME")
     chosen = parser.parse_args(arguments)
