@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from scenarios.errors import InputError
+from scenarios.interrupts import Interrupted, interrupts
 
 if TYPE_CHECKING:
     from scenarios.workers import Progress
@@ -307,12 +308,14 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     sys.path.append(os.getcwd())  # where a reader's own module:object is looked for
     try:
         command = typer.main.get_command(app)
-        sys.exit(command.main(args=arguments, prog_name="testtrack", standalone_mode=False) or 0)
+        with interrupts():
+            code = command.main(args=arguments, prog_name="testtrack", standalone_mode=False)
+        sys.exit(code or 0)
     except InputError as error:
         _fail(str(error), BAD_INPUT)
     except UsageError as error:
         _fail(error.format_message(), BAD_INPUT)
-    except (KeyboardInterrupt, typer.Abort):
+    except Interrupted:
         _fail("interrupted", INTERRUPTED)
     except RuntimeError as error:
         if type(error).__name__ not in CANNOT_BE_DONE:

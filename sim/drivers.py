@@ -134,7 +134,10 @@ class Driver(QuickVehicle):
         )
 
     def _contested(self, lane_index: LaneIndex) -> bool:
-        """Whether somebody near is changing into a lane already; few are at any time."""
+        """Whether somebody near, or coming fast, is changing into a lane already; few are at any time.
+
+        The road counts who changes lanes on the old one, until the middle is crossed.
+        """
         for other in self.road.vehicles:
             if other.target_lane_index[2] != lane_index[2] or other.lane_index[2] == lane_index[2]:
                 continue
@@ -142,7 +145,9 @@ class Driver(QuickVehicle):
                 continue
             reach = (self.LENGTH + other.LENGTH) / 2 + self.jam_gap
             reach += self.TIME_WANTED * max(self.speed, other.speed)
-            if abs(self.lane_distance_to(other)) < reach:
+            away = self.lane_distance_to(other)
+            follower, leader = (self, other) if away > 0 else (other, self)
+            if abs(away) < reach or not self._room(follower, leader, follower.acceleration(follower, leader)):
                 return True
         return False
 

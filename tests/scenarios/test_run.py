@@ -139,6 +139,7 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(tmp_path):
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert out == ""
+    assert err.splitlines()[-1] == "testtrack: interrupted"
     assert "Traceback" not in err
     assert list(tmp_path.iterdir()) == []
 
