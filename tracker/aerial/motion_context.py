@@ -38,6 +38,8 @@ class ContextParameters:
         fewest: With fewer there is no regression, and the forecast goes straight on: 3 as printed.
         ridge: lambda of `regression.affine`, px^2.
         paced: Whether a predictor's clock runs as fast as the predictand went beside it.
+        doubt: How many usual errors of a straight line the way of a single predictor must be off it to count;
+            several count for more. 0 believes the predictors.
         search_every: Frames between two searches for more predictors.
     """
 
@@ -52,6 +54,7 @@ class ContextParameters:
     fewest: int = 1
     ridge: float = 400.0
     paced: bool = True
+    doubt: float = 1.0
     search_every: int = 5
 
 
@@ -64,6 +67,7 @@ PRINTED = ContextParameters(
     fewest=3,
     ridge=0.0,
     paced=False,
+    doubt=0.0,
     search_every=1,
 )
 """As printed, with alpha regularised: without that every exponent is infinite."""
@@ -130,8 +134,9 @@ class ContextForecast:
         self._trajectories, self._track = trajectories, track
         section, self._tick = last_section(trajectories, track, self._parameters.window)
         self._began = self._base = self._tick
-        self.point = self._base_point = drift(section[-ANCHOR:])[0]
-        self.velocity = drift(section)[1]
+        self.point = self._line = self._carried = self._base_point = drift(section[-ANCHOR:])[0]
+        self.velocity = self._straight = drift(section)[1]
+        self._witnesses = 0
         self._section = section
         self._way = 0.0
         self._earlier = np.zeros((2, 2))
@@ -155,21 +160,37 @@ class ContextForecast:
         if len(left) < len(self.guides):
             self._begin(left)
             lead = 1
-        before = self.point
+        before = self._carried
         if len(self.guides) >= self._parameters.fewest:
             reference = np.array([self._place(g, 0) for g in self.guides])
             way = np.array([self._place(g, lead) for g in self.guides]) - reference
             current = reference + np.array([[g.stretch] for g in self.guides]) * way
-            self.point, apart = carry(reference, current, self._base_point, ridge=self._parameters.ridge)
+            self._carried, apart = carry(reference, current, self._base_point, ridge=self._parameters.ridge)
             self._scatter = apart.T @ apart
+            self._witnesses = len(self.guides)
         else:
-            self.point = before + self.velocity
+            self._carried = before + self.velocity
         self._tick += 1
-        self._section = np.concatenate([self._section[-self._parameters.window + 1 :], self.point[None]])
-        self._way += float(np.hypot(*(self.point - before)))
+        self._section = np.concatenate([self._section[-self._parameters.window + 1 :], self._carried[None]])
+        self._way += float(np.hypot(*(self._carried - before)))
         self.velocity = drift(self._section[-6:])[1] if self.guides else self.velocity
+        self.point = self._believed()
         self._spread()
         self._drop_diverging()
+
+    def _believed(self) -> Floats:
+        """Lead what the predictors show back to the straight line, as far as drivers differ anyway.
+
+        That is the positive part of the estimator of James and Stein: of the usual error of a line a
+        fraction of one over the predictors may be chance.
+        """
+        lead = self._tick - self._began
+        apart = self._carried - (self._line + lead * self._straight)
+        way = lead * float(np.hypot(*self._straight))
+        usual = self._growth.covariance(unit(self._straight), way, lead)
+        evidence = float(apart @ np.linalg.solve(usual, apart)) * max(self._witnesses, 1)
+        share = max(1.0 - self._parameters.doubt**2 / max(evidence, 1e-9), 0.0)
+        return np.asarray(self._carried - (1.0 - share) * apart)
 
     def _place(self, guide: Guide, lead: int) -> Floats:
         """Return (2,) where a predictor is by a line through its last points: less noise, no lag."""
@@ -182,7 +203,7 @@ class ContextForecast:
         self.guides = [Guide(g.track, g.tick(lead), g.pace, g.stretch) for g in guides]
         self._earlier = self._earlier + self._scatter / max(len(guides), 1)
         self._scatter = np.zeros((2, 2))
-        self._base, self._base_point = self._tick, self.point
+        self._base, self._base_point = self._tick, self._carried
 
     def _spread(self) -> None:
         """Weigh the usual growth of the error and what the predictors' own ways differ by."""
@@ -256,7 +277,7 @@ class ContextForecast:
             return None
         # Side by side with the forecast, between two ticks if need be: where the road bends that is what
         # counts.
-        ahead = np.clip(float((self.point - stop) @ theirs) / length**2 * (window - 1), -3, 3)
+        ahead = np.clip(float((self._carried - stop) @ theirs) / length**2 * (window - 1), -3, 3)
         begin = float(np.clip(begin + ahead, first, last))
         ratio = float(np.clip(np.hypot(*ours) / length, 1.0 / FASTEST, FASTEST))
         return Guide(track, begin, 1.0, ratio) if last - begin < ROOM else Guide(track, begin, ratio, 1.0)

@@ -232,6 +232,25 @@ def test_without_predictors_it_goes_straight_on():
     assert (np.diff(spreads) > 0).all()
 
 
+def test_one_that_brakes_by_itself_says_little_and_many_say_much():
+    off = {}
+    for count in (1, 6):
+        known = Trajectories()
+        for track in range(1, count + 1):
+            for tick in range(-100, 41):
+                # At the place where the hidden one vanishes they go on at less than their speed.
+                ahead = tick + 45 + track
+                known.append(track, tick, [3.0 * min(ahead, 39) + 2.5 * max(ahead - 39, 0), 4.0 * track])
+        for tick in range(40):
+            known.append(9, tick, [3.0 * tick, 0.0])
+        forecast = ContextForecast(known, 9)
+        forecast.step(69)
+        off[count] = 3.0 * 69 - forecast.point[0]
+        assert abs(forecast.point[1]) < 0.5
+    assert off[1] < 1.0
+    assert 8.0 < off[6] < 0.5 * 30 + 1.0
+
+
 def test_printed_rules_need_three_predictors():
     few = _traffic(np.random.default_rng(2), hidden_at=55, lags=(80, 110))
     forecast = ContextForecast(few, 9, parameters=PRINTED)
