@@ -101,6 +101,20 @@ class Background:
         x0, y0, x1, y1 = self.view
         return np.asarray(np.round(self._mean[y0:y1, x0:x1]).astype(np.uint8))
 
+    def mean(self, part: tuple[slice, slice]) -> NDArray[np.float32]:
+        """Return (h, w, 3) the background of a part of the view."""
+        x0, y0, x1, y1 = self.view
+        return self._mean[y0:y1, x0:x1][part]
+
+    def adopt(self, mask: NDArray[np.bool_]) -> None:
+        """Take the last picture for the ground where a mask (h, w) of the view says so."""
+        x0, y0, x1, y1 = self.view
+        part = np.s_[y0:y1, x0:x1]
+        mask = mask & self.valid
+        self._mean[part][mask] = self.laid[mask]
+        self._spread[part][mask] = NEW_SPREAD
+        self._support[part][mask], self._rivals[part][mask] = KNOWN, 0
+
     def _go_along(self, corners: Floats) -> None:
         """Move the window if the view leaves it."""
         low, high = np.floor(corners.min(0)), np.ceil(corners.max(0))

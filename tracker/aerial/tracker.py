@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tracker.aerial import appearance, tracks
 from tracker.aerial.background import Background
 from tracker.aerial.forecasts import WINDOW, Forecaster
+from tracker.aerial.ghosts import contrast
 from tracker.aerial.hidden import HiddenVehicles
 from tracker.aerial.measuring import free_outlines, outline
 from tracker.aerial.motion_context import ContextForecast
@@ -36,12 +37,17 @@ MOVED = 0.5
 does not go far."""
 COMPACT = 0.6
 """Share of a rectangle that is foreground where a track begins: what is less may be two vehicles."""
+GHOST, CLEAR = -0.4, 0.0
+"""Log ratio of gradients along an outline (`tracker.aerial.ghosts`) below which nothing is there, and above
+which a track begins."""
 ENOUGH = 5
 """Vehicles whose median size is the usual one."""
 SMALLEST = np.array([0.5, 0.5])
 """Length and width, in usual ones, from which on a region may be a vehicle's."""
 LARGEST = np.array([1.4, 1.5])
 """Length and width of a region, in usual ones, up to which it is one vehicle's."""
+HUGE = np.array([3.5, 2.2])
+"""The same of the largest lorry: what is more is the light, or a bridge's edge, or many vehicles."""
 LEAST_HISTORY = 20
 """Frames that a track must have been measured to be forecast once it vanishes."""
 GOES = 8.0
@@ -106,13 +112,22 @@ class AerialTracker:
         senior = np.array([track.confirmed for track in self._tracks], np.bool_)
         own, beaten, left = outline(blobs.labels, self._single(blobs), senior, places, headings, sizes)
         rest = find_blobs(left > 0, LEAST_AREA)
+        sharper = contrast(rest, self._background)
+        self._background.adopt(np.append(False, sharper < GHOST)[rest.labels])
         free = free_outlines(rest.labels, len(rest))
         to_picture = inverse(to_mosaic)
         cut = self._cut_off(transform(to_picture, own.corners() + origin))
         for k, track in enumerate(self._tracks):
             track.misses += 1
             if own.pixels[k]:
-                tracks.measure(track, own.centres[k] + origin, own.sizes[k], self._tick, bool(cut[k]))
+                tracks.measure(
+                    track,
+                    own.centres[k] + origin,
+                    own.sizes[k],
+                    self._tick,
+                    bool(cut[k]),
+                    self._usual * LARGEST,
+                )
         # Two tracks were on one vehicle.
         self._tracks = [track for track, gone in zip(self._tracks, beaten, strict=True) if not gone]
         missed = [track for track in self._tracks if track.misses]
@@ -122,11 +137,20 @@ class AerialTracker:
         for i, j in zip(rows.tolist(), columns.tolist(), strict=True):
             tracks.measure(missed[i], free.centres[j], free.sizes[j], self._tick, bool(cut[j]))
         compact = free.pixels >= COMPACT * free.sizes.prod(1)
-        large = (free.sizes >= SMALLEST * self._usual).all(1)
-        for j in np.setdiff1d(np.flatnonzero(compact & large & (free.pixels > 0)), columns).tolist():
+        fitting = ((free.sizes >= SMALLEST * self._usual) & (free.sizes <= self._most())).all(1)
+        clear = (sharper > CLEAR) & (free.pixels > 0)
+        for j in np.setdiff1d(np.flatnonzero(compact & fitting & clear), columns).tolist():
             self._tracks.append(tracks.begin(next(self._ids), free, j, self._tick))
+        double = {track.id for track in tracks.doubles(self._tracks, self._usual)}
+        self._tracks = [
+            track for track in self._tracks if track.id not in double and (track.size <= self._most()).all()
+        ]
         found = np.concatenate([own.corners()[own.pixels > 0] + origin, free.corners()])
         return _boxes(transform(to_picture, found))
+
+    def _most(self) -> Floats:
+        """Return (2,) the length and width, px, of the largest vehicle, a lorry, as far as that is known."""
+        return HUGE * self._usual if self._usual.any() else np.full(2, np.inf)
 
     def _single(self, blobs: Blobs) -> NDArray[np.bool_]:
         """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of the known."""

@@ -42,6 +42,8 @@ SLOWEST = 0.25
 GROW, SHRINK, NEW = 0.15, 0.1, 0.3
 """How fast the size follows larger and smaller outlines, and those of a track that is not settled."""
 PICTURE_EVERY = 4
+WITHIN = 0.6
+"""Usual lengths and widths that the centres of two vehicles are apart at least."""
 
 
 @dataclass(slots=True)
@@ -127,10 +129,13 @@ def predict(tracks: list[Track]) -> None:
         track.state, track.spread = mean[2 * k : 2 * k + 2], spread[2 * k : 2 * k + 2]
 
 
-def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool) -> bool:
+def measure(
+    track: Track, centre: Floats, size: Floats, tick: int, blocked: bool, largest: Floats | None = None
+) -> bool:
     """Correct a track by its outline along its heading.
 
-    Where a part is hidden the end that lies where it was expected is right, and the length is the track's.
+    Where a part is hidden the end that lies where it was expected is right, and the length is the track's;
+    where there is more than that the track began at a part, and grows.
 
     Args:
         track: Advanced to this frame.
@@ -138,6 +143,7 @@ def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool
         size: (2,) length and width, px.
         tick: Of the frame.
         blocked: Whether the outline touches the picture's border.
+        largest: (2,) up to which it grows, px; None is not at all.
 
     Returns:
         Whether it was taken; what lies too far off is another vehicle's, as where one drives on a bridge.
@@ -156,6 +162,8 @@ def measure(track: Track, centre: Floats, size: Floats, tick: int, blocked: bool
         ahead = candidates[np.abs(candidates).argmin()]
         at = track.state[:, 0] + ahead * track.heading
         kalman.update(track.state, track.spread, np.arange(2), at, PART**2)
+        if size[0] > track.size[0] and not blocked and largest is not None and (size <= largest).all():
+            track.size += GROW * np.maximum(size - track.size, 0.0)
         track.hits, track.misses, track.since = track.hits + 1, 0, tick
         return True
     if settled:
@@ -197,3 +205,15 @@ def take_free(tracks: list[Track], outlines: Outlines) -> tuple[NDArray[np.int64
     spread = np.array([track.spread[:, 0, 0] for track in tracks]) + NOISE**2 + 4.0
     squared = ((outlines.centres[None] - places[:, None]) ** 2 / spread[:, None]).sum(-1)
     return assign(np.where(outlines.pixels > 0, squared, np.inf), GATE)
+
+
+def doubles(tracks: list[Track], usual: Floats) -> list[Track]:
+    """Return who lies so near to a senior track that both would be in one vehicle of the usual size (2,)."""
+    seniors: list[Track] = []
+    found: list[Track] = []
+    for track in sorted(tracks, key=lambda t: (-t.confirmed, -t.hits)):
+        across = track.heading[::-1] * np.array([-1.0, 1.0])
+        apart = np.array([other.centre for other in seniors]).reshape(-1, 2) - track.centre
+        near = np.abs(apart @ np.column_stack([track.heading, across])) < WITHIN * usual
+        (found if near.all(1).any() else seniors).append(track)
+    return found

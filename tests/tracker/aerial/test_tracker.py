@@ -96,5 +96,19 @@ def test_without_re_acquisition_they_are_new(frames):
         assert not set(numbers) & set(before[lane])
 
 
+def test_what_is_larger_than_any_lorry_is_no_vehicle(frames, monkeypatch):
+    monkeypatch.setattr("tracker.aerial.tracker.ENOUGH", 2)
+    tracker, largest = AerialTracker(), []
+    tracker.start(INFO)
+    for k, image in enumerate(frames[:110]):
+        if k > 85:
+            # The sun comes out on a field.
+            image = image.copy()
+            image[185:235, 40:140] = np.clip(image[185:235, 40:140].astype(int) + 60, 0, 255)
+        tracks = tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+        largest.append((tracks.boxes[:, 2] - tracks.boxes[:, 0]).max(initial=0.0))
+    assert max(largest) < 40.0
+
+
 def test_the_tracker_keeps_the_contract():
     check_tracker(AerialTracker())

@@ -69,6 +69,33 @@ def test_of_a_vehicle_that_drives_under_a_bridge_the_rear_tells_the_place():
     assert abs(track.size[0] - SIZE[0]) < 2.0
 
 
+def test_a_track_that_began_at_a_part_grows_to_the_whole_and_no_further():
+    track = driven()
+    track.confirmed, track.size = True, np.array([12.0, 12.0])
+    for tick in range(40, 70):
+        tracks.predict([track])
+        tracks.measure(track, np.array([50.0 + 3.0 * tick, 100.0]), SIZE, tick, False, 1.4 * SIZE)
+    assert track.whole
+    assert abs(track.size[0] - SIZE[0]) < 3.0
+    length = track.size[0]
+    for tick in range(70, 90):
+        tracks.predict([track])
+        tracks.measure(track, np.array([50.0 + 3.0 * tick, 100.0]), 2.0 * SIZE, tick, False, 1.4 * SIZE)
+    assert track.size[0] == length
+
+
+def test_two_tracks_in_one_vehicle_are_one_too_many():
+    first, abreast, behind, double = (
+        driven(number=1),
+        driven(number=2, y=116.0),
+        tracks.begin(3, outlines((50.0 + 3 * 39 - 32.0, 100.0)), 0, 39),
+        tracks.begin(4, outlines((50.0 + 3 * 39 - 9.0, 103.0)), 0, 39),
+    )
+    assert tracks.doubles([double, first, abreast, behind], SIZE) == [double]
+    # As long as no size is the usual one nothing is known.
+    assert tracks.doubles([double, first], np.zeros(2)) == []
+
+
 def test_a_confirmed_track_does_not_jump():
     track = driven()
     track.confirmed = True
