@@ -50,4 +50,4 @@ def _gradient(picture: NDArray[np.generic]) -> Floats:
     """Return (H, W) the size of the gradient, grey levels a px."""
     grey = picture.astype(np.float32).mean(2)
     across, down = (cv2.Sobel(grey, cv2.CV_32F, *order, scale=0.125) for order in ((1, 0), (0, 1)))
-    return np.hypot(across, down).astype(np.float64)
+    return np.asarray(np.hypot(across, down), np.float64)
