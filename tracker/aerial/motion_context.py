@@ -136,7 +136,7 @@ class ContextForecast:
         self._began = self._base = self._tick
         self.point = self._line = self._carried = self._base_point = drift(section[-ANCHOR:])[0]
         self.velocity = self._straight = drift(section)[1]
-        self._witnesses = 0
+        self._witnesses, self._turned = 0, False
         self._section = section
         self._way = 0.0
         self._earlier = np.zeros((2, 2))
@@ -181,16 +181,21 @@ class ContextForecast:
     def _believed(self) -> Floats:
         """Lead what the predictors show back to the straight line, as far as drivers differ anyway.
 
-        That is the positive part of the estimator of James and Stein: of the usual error of a line a
-        fraction of one over the predictors may be chance.
+        Along the line and across it that is the positive part of the estimator of James and Stein. Where the
+        way has once turned, the line says nothing any more.
         """
+        ahead = unit(self._straight)
+        self._turned |= bool(unit(self.velocity) @ ahead < SAME_WAY)
+        if self._turned:
+            return self._carried
         lead = self._tick - self._began
-        apart = self._carried - (self._line + lead * self._straight)
-        way = lead * float(np.hypot(*self._straight))
-        usual = self._growth.covariance(unit(self._straight), way, lead)
-        evidence = float(apart @ np.linalg.solve(usual, apart)) * max(self._witnesses, 1)
-        share = max(1.0 - self._parameters.doubt**2 / max(evidence, 1e-9), 0.0)
-        return np.asarray(self._carried - (1.0 - share) * apart)
+        line = self._line + lead * self._straight
+        frame = np.array([ahead, [-ahead[1], ahead[0]]])
+        apart = frame @ (self._carried - line)
+        usual = self._growth.covariance(ahead, lead * float(np.hypot(*self._straight)), lead)
+        chance = self._parameters.doubt**2 * np.diag(frame @ usual @ frame.T) / max(self._witnesses, 1)
+        share = np.maximum(1.0 - chance / np.maximum(apart**2, 1e-9), 0.0)
+        return np.asarray(line + (share * apart) @ frame)
 
     def _place(self, guide: Guide, lead: int) -> Floats:
         """Return (2,) where a predictor is by a line through its last points: less noise, no lag."""
