@@ -299,7 +299,7 @@ class BackgroundModel:
         self._p_b[at] = 1.0 - self._p_b[at]
 
     def _revise(self, pixels: NDArray[np.uint8], features: Features, at: NDArray[np.int64]) -> None:
-        """Begin the background anew where it was traffic: with what a pixel shows most often, and now.
+        """Make background of what a pixel shows now and has shown most often: it was traffic that stood there.
 
         Args:
             pixels: (P, 3) uint8.
@@ -311,7 +311,7 @@ class BackgroundModel:
             COLOUR, self._tables[0].features[0, at], features[0][at], p.tolerance, p.colour_floor
         )
         at = at[usual]
-        self._p_b[at] = self._tables[0].seen[0, at] * self._factor
+        self._p_b[at] = np.maximum(self._p_b[at], self._tables[0].seen[0, at] * self._factor)
         whole = np.ones(len(at), np.float32) if self._conditional else self._p_b[at]
         whole /= self._shared_factors(at)
         for kind, table, feature, tolerance, floor in self._kinds(features):

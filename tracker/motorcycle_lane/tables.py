@@ -238,7 +238,7 @@ def turn(table, at, first, p_b, factor, factors_shared):  # type: ignore[no-unty
 
 @njit(cache=True)
 def found_anew(kind, table, features, at, whole, tolerance, floor):  # type: ignore[no-untyped-def]
-    """Take what pixels show for the only thing that their background ever showed.
+    """Take what pixels show for what their background always shows; what else it has shown stays known.
 
     Args:
         kind: COLOUR, GRADIENT or PAIR.
@@ -251,10 +251,10 @@ def found_anew(kind, table, features, at, whole, tolerance, floor):  # type: ign
     """
     entries, frequency, shared_frequency = table.features, table.seen, table.shared
     for a in range(at.size):
-        i, known = at[a], False
+        i = at[a]
         for k in range(entries.shape[0]):
             if frequency[k, i] == 0.0:
                 break
-            own = not known and same(kind, entries[k, i], features[i], tolerance, floor)
-            shared_frequency[k, i] = whole[a] if own else np.float32(0.0)
-            known = known or own
+            if same(kind, entries[k, i], features[i], tolerance, floor):
+                shared_frequency[k, i] = whole[a]
+                break

@@ -174,12 +174,10 @@ class PlainModel:
         usual = tables[0].entries[0]
         if not tables[0].same(usual[2], features[0]):
             return
-        self.p_b[at] = usual[0]
+        self.p_b[at] = max(self.p_b[at], usual[0])
         for table, feature in zip(tables, features, strict=True):
-            known = [k for k, e in enumerate(table.entries) if table.same(e[2], feature)]
-            for k, entry in enumerate(table.entries):
-                whole = 1.0 if self.parameters.mode is StatMode.CONDITIONAL else usual[0]
-                entry[1] = whole * (k == known[0])
+            entry = next(e for e in table.entries if table.same(e[2], feature))
+            entry[1] = 1.0 if self.parameters.mode is StatMode.CONDITIONAL else self.p_b[at]
         self.background[at] = image[at]
 
     def clear(self, what):
