@@ -299,7 +299,7 @@ class BackgroundModel:
         self._p_b[at] = 1.0 - self._p_b[at]
 
     def _revise(self, pixels: NDArray[np.uint8], features: Features, at: NDArray[np.int64]) -> None:
-        """Make background of what a pixel shows now and has shown most often: it was traffic that stood there.
+        """Make background of what a pixel shows now and has shown most often: traffic had stood there.
 
         Args:
             pixels: (P, 3) uint8.
