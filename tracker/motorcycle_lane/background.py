@@ -8,6 +8,7 @@ eq. (4). What stays for long becomes background at once, eqs. (12)-(14).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -17,7 +18,18 @@ from numpy.typing import NDArray
 
 from tracker.motorcycle_lane.change import carry, corner, differences, keep
 from tracker.motorcycle_lane.features import Features, extract
-from tracker.motorcycle_lane.tables import COLOUR, GRADIENT, PAIR, Table, evidence, learn, totals, turn
+from tracker.motorcycle_lane.tables import (
+    COLOUR,
+    GRADIENT,
+    PAIR,
+    Table,
+    all_same,
+    evidence,
+    found_anew,
+    learn,
+    totals,
+    turn,
+)
 
 FADED = np.float32(1e-20)
 """A common factor that has fallen so far is taken into the tables."""
@@ -94,6 +106,7 @@ class BackgroundParameters:
     follow_light: bool = True
     uncovered: bool = True
     rims: bool = True
+    revise: bool = True
 
     def __post_init__(self) -> None:
         for name in ("colours", "gradients", "pairs"):
@@ -111,6 +124,7 @@ PAPER = BackgroundParameters(
     follow_light=False,
     uncovered=False,
     rims=False,
+    revise=False,
 )
 """As printed, with OpenCV's values where the paper's are lost."""
 
@@ -226,19 +240,21 @@ class BackgroundModel:
             grow_shared = background * (rate / self._factor_shared)
         else:
             grow_shared = background * (rate / self._factor)
-        for kind, table, feature, tolerance, floor in zip(
-            (COLOUR, GRADIENT, PAIR),
-            self._tables,
-            features,
-            (p.tolerance, p.tolerance, p.pair_tolerance),
-            (p.colour_floor, p.gradient_floor, 0.0),
-            strict=True,
-        ):
+        for kind, table, feature, tolerance, floor in self._kinds(features):
             learn(kind, table, feature, rate / self._factor, grow_shared, tolerance, floor)
         if not self.training:
             self._turn_once_off(np.flatnonzero(foreground))
+            if p.revise and self._frames * p.rate < 1.0:
+                self._revise(pixels, features, np.flatnonzero(found))
         self._take_in()
         return found
+
+    def _kinds(self, features: Features) -> Iterator[tuple[int, Table, NDArray[np.uint32], float, float]]:
+        """Yield each kind of feature with its table, what the frame shows, and what tells two apart."""
+        p = self.parameters
+        tolerances = p.tolerance, p.tolerance, p.pair_tolerance
+        floors = p.colour_floor, p.gradient_floor, 0.0
+        yield from zip((COLOUR, GRADIENT, PAIR), self._tables, features, tolerances, floors, strict=True)
 
     def _with_rims(self, foreground: NDArray[np.bool_], changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return (P,) foreground and what is changed beside more than specks of it."""
@@ -281,6 +297,26 @@ class BackgroundModel:
         for table, (used, _) in zip(self._tables, (p.colours, p.gradients, p.pairs), strict=True):
             turn(table, at, used, self._p_b[at], self._factor, self._shared_factors(at))
         self._p_b[at] = 1.0 - self._p_b[at]
+
+    def _revise(self, pixels: NDArray[np.uint8], features: Features, at: NDArray[np.int64]) -> None:
+        """Make background of what a pixel shows now and has shown most often: traffic had stood there.
+
+        Args:
+            pixels: (P, 3) uint8.
+            features: Of the frame.
+            at: Pixels that are foreground.
+        """
+        p = self.parameters
+        usual = all_same(
+            COLOUR, self._tables[0].features[0, at], features[0][at], p.tolerance, p.colour_floor
+        )
+        at = at[usual]
+        self._p_b[at] = np.maximum(self._p_b[at], self._tables[0].seen[0, at] * self._factor)
+        whole = np.ones(len(at), np.float32) if self._conditional else self._p_b[at]
+        whole /= self._shared_factors(at)
+        for kind, table, feature, tolerance, floor in self._kinds(features):
+            found_anew(kind, table, feature, at, whole, tolerance, floor)
+        self._background[at] = pixels[at]
 
     def _shared_factors(self, at: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the common factor of p(v|b) of some pixels."""

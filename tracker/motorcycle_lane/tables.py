@@ -234,3 +234,27 @@ def turn(table, at, first, p_b, factor, factors_shared):  # type: ignore[no-unty
             seen, shared = frequency[k, i] * factor, shared_frequency[k, i] * factors_shared[a]
             if 2.0 * shared * p_b[a] <= seen:
                 shared_frequency[k, i] = (seen - p_b[a] * shared) / (others * factors_shared[a])
+
+
+@njit(cache=True)
+def found_anew(kind, table, features, at, whole, tolerance, floor):  # type: ignore[no-untyped-def]
+    """Take what pixels show for what their background always shows; what else it has shown stays known.
+
+    Args:
+        kind: COLOUR, GRADIENT or PAIR.
+        table: Of P pixels.
+        features: (P,) uint32, learnt already.
+        at: (K,) the pixels.
+        whole: (K,) float32, what p(v|b) becomes, without its common factor.
+        tolerance: As in `same`.
+        floor: As in `same`.
+    """
+    entries, frequency, shared_frequency = table.features, table.seen, table.shared
+    for a in range(at.size):
+        i = at[a]
+        for k in range(entries.shape[0]):
+            if frequency[k, i] == 0.0:
+                break
+            if same(kind, entries[k, i], features[i], tolerance, floor):
+                shared_frequency[k, i] = whole[a]
+                break

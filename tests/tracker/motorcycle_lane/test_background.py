@@ -223,6 +223,19 @@ def test_background_is_learnt_within_the_first_frames(mode):
     assert np.abs(model.background[:4] - base[:4]).mean() < 3
 
 
+def test_traffic_that_the_training_took_for_background_goes_once_the_road_was_seen_more():
+    """One stands there for 20 of the first 30 frames; then others pass, each of another colour."""
+    rng = np.random.default_rng(4)
+    model = BackgroundModel(3, 3, BackgroundParameters(flash_share=1.0))
+    for t in range(120):
+        riding = t < 20 or t % 10 < 3
+        colour = rng.integers(0, 255) if riding and t >= 20 else 200 if riding else 90
+        mask = model.apply(patch(colour))
+        if t >= 60:
+            assert not mask.any() or riding
+    assert np.abs(model.background.astype(int) - 90).max() <= 1
+
+
 @pytest.mark.parametrize("gain", [0.5, 1.5])
 def test_change_of_the_whole_light_is_learnt_within_a_second(gain):
     rng = np.random.default_rng(2)
@@ -242,10 +255,10 @@ def test_background_behind_foreground_follows_the_light():
     ghosts = {}
     for follow in (True, False):
         model = BackgroundModel(16, 12, BackgroundParameters(follow_light=follow))
-        for t in range(140):
-            gain = 1.0 - 0.5 * np.clip((t - 60) / 60, 0, 1)
+        for t in range(210):
+            gain = 1.0 - 0.5 * np.clip((t - 130) / 60, 0, 1)
             picture = np.full((12, 16, 3), 150.0) * gain
-            if 50 <= t < 130:
+            if 120 <= t < 200:
                 picture[3:9, 5:9] = (220, 20, 20)
             mask = model.apply(picture.astype(np.uint8))
         ghosts[follow] = mask[3:9, 5:9].mean()

@@ -156,6 +156,9 @@ class PlainModel:
             sums, old = self.background[seen].sum(0), before[seen].sum(0)
             growth = np.where(old > 0, sums / np.maximum(old, 1e-9), 1)
             self.background[learnt] = np.minimum(self.background[learnt] * growth, 255)
+        if p.revise and not training and self.frames * p.rate < 1:
+            for at in np.argwhere(mask):
+                self.revise(tuple(at), image, self.features(image, edges, tuple(at)))
         if mask.mean() > self.calm + p.flash_share and not training:
             self.flashing += 1
         else:
@@ -165,6 +168,17 @@ class PlainModel:
         if self.flashing == p.flash_frames:
             self.flashing = self.frames = 0
         return mask
+
+    def revise(self, at, image, features):
+        tables = self.tables[at[0]][at[1]]
+        usual = tables[0].entries[0]
+        if not tables[0].same(usual[2], features[0]):
+            return
+        self.p_b[at] = max(self.p_b[at], usual[0])
+        for table, feature in zip(tables, features, strict=True):
+            entry = next(e for e in table.entries if table.same(e[2], feature))
+            entry[1] = 1.0 if self.parameters.mode is StatMode.CONDITIONAL else self.p_b[at]
+        self.background[at] = image[at]
 
     def clear(self, what):
         for at in np.ndindex(self.shape):
