@@ -24,8 +24,9 @@ class TrackerInTheLoop(gymnasium.Wrapper[Image, Action, Image, Action], RecordCo
     """Runs a tracker on every frame that an environment shows.
 
     ``info["tracks"]`` holds the tracks. The reward of a frame is the F1 of its confirmed boxes against its
-    scored truth (scoring.md 4 to 6), in [0, 1]: 1 where there is nothing to be found and nothing is claimed.
-    In frames that are not scored, the training of the lane, it is 0.
+    scored truth (scoring.md 4 to 6), in [0, 1]. Where nothing is to be found and nothing is claimed, F1 is
+    not defined, and the reward is 0: actions aim the camera, so that anything more would be earned best by
+    looking where nobody drives. It is 0 too in frames that are not scored, the training of the lane.
 
     Args:
         env: One of `sim.env`, wrapped in others or not: the tracker sees what they show.
@@ -99,7 +100,7 @@ class TrackerInTheLoop(gymnasium.Wrapper[Image, Action, Image, Action], RecordCo
             return tracks, 0.0
         truth, found, overlap = self._selector.compare(frame)
         if not len(truth) + len(found):
-            return tracks, 1.0
+            return tracks, 0.0
         hits = clear(
             Sequence.of([truth], [found], [overlap]), threshold=self._params.match_iou
         ).true_positives

@@ -74,6 +74,16 @@ def test_perfect_tracks_earn_one_and_none_earn_nothing():
     assert silent[29:] == [0.0] * 6
 
 
+@pytest.mark.parametrize("tracker", [SilentTracker, ShiftedTracker])
+def test_looking_where_nobody_drives_earns_nothing(tracker):
+    env = gymnasium.make(
+        "sim:testtrack/Aerial-v0",
+        overrides=(*SMALL, "seconds=1", "traffic.density=0", "traffic.oncoming_density=0", "traffic.convoy=0"),
+    )
+    assert rewards(TrackerInTheLoop(env, tracker()), 3) == [0.0] * 3
+    assert not len(env.unwrapped.observation.truth.ids)
+
+
 def test_the_reward_is_the_f1_of_a_frame():
     env = lane("association@noisy", "seconds=2", "camera.width=360", "camera.height=240")
     env.reset(seed=500)
