@@ -78,7 +78,13 @@ def test_perfect_tracks_earn_one_and_none_earn_nothing():
 def test_looking_where_nobody_drives_earns_nothing(tracker):
     env = gymnasium.make(
         "sim:testtrack/Aerial-v0",
-        overrides=(*SMALL, "seconds=1", "traffic.density=0", "traffic.oncoming_density=0", "traffic.convoy=0"),
+        overrides=(
+            *SMALL,
+            "seconds=1",
+            "traffic.density=0",
+            "traffic.oncoming_density=0",
+            "traffic.convoy=0",
+        ),
     )
     assert rewards(TrackerInTheLoop(env, tracker()), 3) == [0.0] * 3
     assert not len(env.unwrapped.observation.truth.ids)
