@@ -37,13 +37,15 @@ class CloserLook:
     Attributes:
         key: The trackers with their colours in the plots, where there are several.
         plots: Recall by stratum, one a quantity.
-        tables: Both conventions, and the covariances where a tracker gives some.
+        conventions: Scores under both, in one table.
+        covariances: A table of the trackers that give some, if any does.
         strata: The numbers behind the plots.
     """
 
     key: list[tuple[str, str]]
     plots: list[Plot]
-    tables: list[ResultTable]
+    conventions: list[ResultTable]
+    covariances: list[ResultTable]
     strata: list[ResultTable]
 
 
@@ -56,13 +58,14 @@ def closer_look(runs: Sequence[tuple[str, Details | None]]) -> CloserLook | None
     known = [(name, details) for name, details in runs if details and _has_boxes(details)]
     if not known:
         return None
-    colours = [SERIES[k % len(SERIES)] for k in range(len(known))]
-    key = [(name, colour) for (name, _), colour in zip(known, colours, strict=True)]
     strata = {quantity: bins for quantity, bins in known[0][1]["strata"].items() if bins}
+    # Colours are those of the whole page: a tracker without boxes keeps its own.
+    colours = {name: SERIES[k % len(SERIES)] for k, (name, _) in enumerate(runs)}
     return CloserLook(
-        key=key if len(known) > 1 else [],
-        plots=[_plot(quantity, bins, known) for quantity, bins in strata.items()],
-        tables=[_conventions(known), *_consistency(known)],
+        key=[(name, colours[name]) for name, _ in known] if len(runs) > 1 else [],
+        plots=[_plot(quantity, bins, known, colours) for quantity, bins in strata.items()],
+        conventions=[_conventions(known)],
+        covariances=_covariances(known),
         strata=[_stratum_table(quantity, bins, known) for quantity, bins in strata.items()],
     )
 
@@ -71,13 +74,13 @@ def _has_boxes(details: Details) -> bool:
     return number(details["conventions"]["amodal"].get("hota")) != DASH
 
 
-def _plot(quantity: str, bins: Details, runs: Sequence[tuple[str, Details]]) -> Plot:
-    rows: list[list[Share | None]] = []
-    for _, details in runs:
+def _plot(
+    quantity: str, bins: Details, runs: Sequence[tuple[str, Details]], colours: Mapping[str, str]
+) -> Plot:
+    rows: list[tuple[str, list[Share | None]]] = []
+    for tracker, details in runs:
         recalls = [details["strata"][quantity][name]["recall"] for name in bins]
-        rows.append(
-            [None if recall is None else (_mean(recall), f"{_mean(recall):.2f}") for recall in recalls]
-        )
+        rows.append((colours[tracker], [(_mean(recall), f"{_mean(recall):.2f}") for recall in recalls]))
     title, unit = STRATA[quantity]
     beneath = [f"{_bounds(name)}\nn = {bins[name]['boxes']}" for name in bins]
     return Plot(
@@ -117,7 +120,7 @@ def _conventions(runs: Sequence[tuple[str, Details]]) -> ResultTable:
     )
 
 
-def _consistency(runs: Sequence[tuple[str, Details]]) -> list[ResultTable]:
+def _covariances(runs: Sequence[tuple[str, Details]]) -> list[ResultTable]:
     """Return a table of the trackers that give covariances, or none."""
     given = [(tracker, details["consistency"]) for tracker, details in runs if details["consistency"]]
     if not given:

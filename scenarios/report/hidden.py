@@ -177,11 +177,11 @@ def by_hidden_time(scores: Mapping[str, Mapping[str, Mapping[str, int | None]]])
     if not any(bins[name]["events"] for name in names):
         return None
     labels = [f"{a}–{b} s" for a, b in itertools.pairwise(names)] + [f"≥ {names[-1]} s"]
-    rows: list[list[Share | None]] = [[] for _ in scores]
-    for row, own in zip(rows, scores.values(), strict=True):
-        for name in names:
-            events, correct = own[name]["events"], own[name]["correct"]
-            row.append((correct / events, str(correct)) if events and correct is not None else None)
+    rows: list[tuple[str, list[Share | None]]] = []
+    for k, own in enumerate(scores.values()):
+        counts = [(own[name]["events"], own[name]["correct"]) for name in names]
+        found = [(c / n, str(c)) if n and c is not None else None for n, c in counts]
+        rows.append((SERIES[k % len(SERIES)], found))
     beneath = [f"{words}\nn = {bins[n]['events']}" for words, n in zip(labels, names, strict=True)]
     return shares(beneath, rows, label="share correct")
 
