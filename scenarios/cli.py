@@ -277,7 +277,7 @@ def check(
 
     try:
         candidate = build(tracker)
-    except (ValueError, TypeError) as error:
+    except ValueError as error:
         raise InputError(str(error)) from error
     try:
         check_tracker(candidate)

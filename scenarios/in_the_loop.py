@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import gymnasium
+import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from scenarios import bridge
@@ -16,6 +17,8 @@ from scenarios.score.frames import Selector
 from scenarios.score.params import Boxes, ScoringParams
 from scenarios.score.sequence import Sequence
 from sim.env import Action, Image, SceneEnv
+from sim.truth.types import FrameTruth
+from sim.world import Role, WorldState
 from tracker.base import Tracker
 from tracker.types import Tracks
 
@@ -24,8 +27,10 @@ class TrackerInTheLoop(gymnasium.Wrapper[Image, Action, Image, Action], RecordCo
     """Runs a tracker on every frame that an environment shows.
 
     ``info["tracks"]`` holds the tracks. The reward of a frame is the F1 of its confirmed boxes against its
-    scored truth (scoring.md 4 to 6), in [0, 1]: 1 where there is nothing to be found and nothing is claimed.
-    In frames that are not scored, the training of the lane, it is 0.
+    scored truth (scoring.md 4 to 6), in [0, 1]. Actions aim the camera, and nothing is to be earned by aiming
+    it where there is little to do: vehicles of a convoy that are out of the picture count as missed; where
+    nothing is to be found and nothing is claimed, which leaves F1 undefined, the reward is 0. It is 0 too in
+    frames that are not scored, the training of the lane.
 
     Args:
         env: One of `sim.env`, wrapped in others or not: the tracker sees what they show.
@@ -98,9 +103,15 @@ class TrackerInTheLoop(gymnasium.Wrapper[Image, Action, Image, Action], RecordCo
         if frame is None:
             return tracks, 0.0
         truth, found, overlap = self._selector.compare(frame)
-        if not len(truth) + len(found):
-            return tracks, 1.0
         hits = clear(
             Sequence.of([truth], [found], [overlap]), threshold=self._params.match_iou
         ).true_positives
-        return tracks, 2 * hits / (len(truth) + len(found))
+        astray = out_of_picture(shown.state, shown.truth, self._params)
+        return tracks, 2 * hits / max(1, len(truth) + astray + len(found))
+
+
+def out_of_picture(state: WorldState, truth: FrameTruth, params: ScoringParams) -> int:
+    """Count the vehicles of a convoy of which too little lies in the picture to be scored."""
+    convoy = state.vehicles.ids[state.vehicles.roles == Role.CONVOY]
+    inside = truth.ids[truth.in_frame >= params.min_visible]
+    return int((~np.isin(convoy, inside)).sum())

@@ -106,8 +106,6 @@ def make_tracker(name: str, scenario: Scenario | None = None, seed: int = 0) -> 
         return make_fed(name, scenario.scene, rate=scenario.rate, seed=seed)
     except ValueError as error:
         raise InputError(str(error)) from error
-    except TypeError as error:
-        raise InputError(f"no tracker {name!r}: calling it without arguments fails: {error}") from error
 
 
 def execute(

@@ -41,7 +41,7 @@ VEHICLE_KINDS = (Kind.CAR, Kind.VAN, Kind.LORRY, Kind.BUS, Kind.MOTORCYCLE)
 
 
 class Role(IntEnum):
-    """How a vehicle takes part in the traffic, as seen from the camera car."""
+    """How a vehicle takes part in the traffic, as seen from the camera car; or that it is in a convoy."""
 
     NONE = 0
     SAME_WAY = 1
@@ -49,6 +49,7 @@ class Role(IntEnum):
     CROSSING = 3
     PARKED = 4
     WRONG_WAY = 5
+    CONVOY = 6
 
 
 class Lamps(IntFlag):

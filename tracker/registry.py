@@ -49,7 +49,7 @@ def build(name: str) -> object:
     """Call what a name stands for, without looking at what that gives.
 
     Raises:
-        ValueError: If there is nothing of that name.
+        ValueError: If there is nothing of that name, or it cannot be called without arguments.
     """
     target = (TRACKERS | DETECTION_TRACKERS).get(name, name)
     module_name, _, attribute = target.partition(":")
@@ -62,3 +62,5 @@ def build(name: str) -> object:
         return factory()
     except ImportError as error:
         raise ValueError(f"tracker {name!r} needs a package that is not here: {error}") from error
+    except TypeError as error:
+        raise ValueError(f"no tracker {name!r}: calling it without arguments fails: {error}") from error

@@ -17,6 +17,7 @@ from scenarios.report.flight import KeptFrame, Path, Return
 from scenarios.report.mosaic import Mosaic, compose, draw_way
 from scenarios.report.palette import SERIES, identity, rgb
 from scenarios.report.pictures import Picture, jpeg
+from scenarios.report.plots import Share, shares
 from scenarios.report.svg import draw_svg
 from scenarios.score.prediction import LEADS, PredictedEvent
 from tracker.aerial.motion_context import ContextForecast
@@ -176,26 +177,13 @@ def by_hidden_time(scores: Mapping[str, Mapping[str, Mapping[str, int | None]]])
     if not any(bins[name]["events"] for name in names):
         return None
     labels = [f"{a}–{b} s" for a, b in itertools.pairwise(names)] + [f"≥ {names[-1]} s"]
-    spread = 0.8 / len(scores)
-
-    def draw(axes: Axes) -> None:
-        for k, own in enumerate(scores.values()):
-            for x, name in enumerate(names):
-                events, correct = own[name]["events"], own[name]["correct"]
-                if not events or correct is None:
-                    continue
-                at = x + (k - (len(scores) - 1) / 2) * spread
-                colour = SERIES[k % len(SERIES)]
-                axes.bar(at, correct / events, 0.9 * spread, color=colour, linewidth=0)
-                axes.text(at, correct / events + 0.015, str(correct), ha="center", fontsize=6.5, color=colour)
-        axes.set_xticks(
-            range(len(names)),
-            [f"{words}\nn = {bins[n]['events']}" for words, n in zip(labels, names, strict=True)],
-        )
-        axes.set(ylim=(0, 1.02), ylabel="share correct")
-        axes.grid(visible=False, axis="x")
-
-    return draw_svg(draw, size=(5.0, 2.4), margins=(0.56, 0.16, 0.5, 0.24))[0]
+    rows: list[tuple[str, list[Share | None]]] = []
+    for k, own in enumerate(scores.values()):
+        counts = [(own[name]["events"], own[name]["correct"]) for name in names]
+        found = [(c / n, str(c)) if n and c is not None else None for n, c in counts]
+        rows.append((SERIES[k % len(SERIES)], found))
+    beneath = [f"{words}\nn = {bins[n]['events']}" for words, n in zip(labels, names, strict=True)]
+    return shares(beneath, rows, label="share correct")
 
 
 def _mean_curve(errors: Sequence[Floats], known: Sequence[int], longest: int) -> Floats:

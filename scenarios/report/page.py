@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from scenarios.log import EpisodeLog
 from scenarios.report import aerial, figures
+from scenarios.report.closer import closer_look
 from scenarios.report.flight import Flight
 from scenarios.report.history import History
 from scenarios.report.moment import Moment, association, pictures
@@ -146,6 +147,7 @@ def write_page(
             difficulty=plain_rows(document.get("difficulty") or {}),
             lane_tables=lane_tables([(document.get("tracker", ""), values)]),
             aerial_tables=aerial_tables([(document.get("tracker", ""), values)]),
+            closer=closer_look([(document.get("tracker", ""), document.get("details"))]),
             moment=_moment_pictures(moment, recording, log) if moment is not None else [],
             association=association(moment) if moment is not None else None,
             flight=aerial.section(

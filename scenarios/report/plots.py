@@ -24,6 +24,11 @@ Floats = NDArray[np.float64]
 Estimate = tuple[float, float, float]
 """A value, and where its 95 % interval begins and ends."""
 
+Share = tuple[float, str]
+"""A share of 1, and what is written above it."""
+_MOST_WRITTEN = 18
+"""Bars of one plot above which there is room for a number."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimeAxis:
@@ -352,6 +357,31 @@ def estimates(rows: Mapping[str, Sequence[Estimate | None]], names: Sequence[str
         axes.spines["left"].set_visible(False)
 
     return draw_svg(draw, size=(4.6, 0.5 + 0.34 * len(rows)), margins=(1.25, 0.1, 0.3, 0.05))[0]
+
+
+def shares(bins: Sequence[str], rows: Sequence[tuple[str, Sequence[Share | None]]], *, label: str) -> Markup:
+    """Draw shares of 1 as bars: a group for each bin, in it one for each of the rows.
+
+    Args:
+        bins: What stands beneath the groups.
+        rows: A colour, and a share for each bin, None where there is none.
+        label: Of the axis of values.
+    """
+    spread = 0.8 / max(1, len(rows))
+    written = len(rows) * len(bins) <= _MOST_WRITTEN
+
+    def draw(axes: Axes) -> None:
+        for k, (colour, row) in enumerate(rows):
+            for place, (value, text) in ((n, item) for n, item in enumerate(row) if item is not None):
+                at = place + (k - (len(rows) - 1) / 2) * spread
+                axes.bar(at, value, 0.9 * spread, color=colour, linewidth=0)
+                if written:
+                    axes.text(at, value + 0.015, text, ha="center", fontsize=6.5, color=colour)
+        axes.set_xticks(range(len(bins)), bins)
+        axes.set(xlim=(-0.6, len(bins) - 0.4), ylim=(0, 1.02), ylabel=label)
+        axes.grid(visible=False, axis="x")
+
+    return draw_svg(draw, size=(4.3, 2.3), margins=(0.56, 0.1, 0.5, 0.24))[0]
 
 
 def _finish_lines(

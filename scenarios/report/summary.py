@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from scenarios.files import moved_in
 from scenarios.report import hidden, plots
+from scenarios.report.closer import closer_look
 from scenarios.report.page import confusion, environment
 from scenarios.report.palette import SERIES
 from scenarios.report.results import aerial_tables, lane_tables
@@ -92,6 +93,7 @@ def write_summary(
                     if "reacquisition_by_hidden_s" in run["scores"]
                 }
             ),
+            closer=closer_look([(str(run["tracker"]), run.get("details")) for run in runs]),
             lines=_lines(scores, len(seeds)),
             paired=[
                 {

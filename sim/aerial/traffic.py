@@ -151,7 +151,7 @@ def _bodies(travellers: Sequence[Traveller], overpass: Overpass | None, first: i
     return Bodies(
         ids=np.array([FIRST_VEHICLE_ID + first + t.number for t in travellers], np.uint32),
         kinds=np.array([t.draw.kind for t in travellers], np.uint8),
-        roles=np.full(count, Role.NONE, np.uint8),
+        roles=np.array([Role.NONE if t.convoy < 0 else Role.CONVOY for t in travellers], np.uint8),
         models=np.array([t.draw.model for t in travellers], np.int32),
         positions=np.column_stack([x, y, height]),
         yaws=-headings,

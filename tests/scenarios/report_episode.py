@@ -151,6 +151,21 @@ def scores() -> dict[str, Any]:
                 "oncoming_as_car": 0.18,
             },
         },
+        "details": {
+            "conventions": {
+                "amodal": {"hota": 0.6123, "mota": 0.7112, "id_switches": 4},
+                "visible": {"hota": 0.5534, "mota": 0.6521, "id_switches": 6},
+            },
+            "strata": {
+                "visible": {
+                    "0.3 to 0.5": {"boxes": 211, "recall": 0.3141, "iou": 0.6271, "id_switches": 2},
+                    "0.9 to 1": {"boxes": 1777, "recall": 0.9732, "iou": 0.8371, "id_switches": 1},
+                },
+                "distance_m": {"10 to 20": {"boxes": 1988, "recall": 0.9042, "iou": None, "id_switches": 5}},
+                "speed_px_s": {},
+            },
+            "consistency": {"nees": 2.345, "within_95": 0.9321, "errors": 1611},
+        },
         "difficulty": {"scored_objects": 13, "traces": {"car": 44, "background": 100}, "pairs": 777},
         "fps": 43.21,
         "peak_rss_mb": 512.0,

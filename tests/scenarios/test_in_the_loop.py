@@ -13,6 +13,7 @@ from scenarios.in_the_loop import TrackerInTheLoop
 from scenarios.score.frames import Selector
 from scenarios.score.params import ScoringParams
 from sim.render.context import RenderUnavailableError, context
+from sim.world import Role
 from tests.scenarios.fakes import SilentTracker
 from tracker.types import Frame, Info, Tracks
 
@@ -72,6 +73,36 @@ def test_perfect_tracks_earn_one_and_none_earn_nothing():
     assert true[:29] == silent[:29] == [0.0] * 29, "in training"
     assert true[29:] == [1.0] * 6
     assert silent[29:] == [0.0] * 6
+
+
+def from_above(tracker, *overrides: str) -> TrackerInTheLoop:
+    bare = ("seconds=2", "traffic.density=0", "traffic.oncoming_density=0", "scenery.trees=0.1")
+    env = gymnasium.make("sim:testtrack/Aerial-v0", overrides=(*SMALL, *bare, *overrides))
+    return TrackerInTheLoop(env, tracker)
+
+
+@pytest.mark.parametrize("tracker", [SilentTracker, ShiftedTracker])
+def test_looking_where_nobody_drives_earns_nothing(tracker):
+    env = from_above(tracker(), "traffic.convoy=0")
+    assert rewards(env, 3) == [0.0] * 3
+    assert not len(env.unwrapped.observation.truth.ids)
+
+
+def test_who_of_a_convoy_is_out_of_the_picture_is_missed():
+    env = from_above("association@perfect", "camera.focal=220", "platform.jitter=0")
+    env.reset(seed=500)
+    still, sideward = np.zeros(4, np.float32), np.array([1, 0, 0, 0], np.float32)
+    seen = []
+    for action in [still] * 3 + [sideward] * 30:
+        _, reward, _, _, info = env.step(action)
+        vehicles = info["truth"].vehicles
+        assert (info["truth"].state.vehicles.roles == Role.CONVOY).sum() == 8
+        followed = int((vehicles.visible >= 0.3).sum())
+        away = 8 - int((vehicles.in_frame >= 0.3).sum())
+        assert reward == pytest.approx(2 * followed / (2 * followed + away))
+        seen.append((followed, away))
+    assert len(set(seen)) > 1
+    assert all(followed and away for followed, away in seen)
 
 
 def test_the_reward_is_the_f1_of_a_frame():

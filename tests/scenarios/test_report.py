@@ -96,8 +96,8 @@ def test_page_is_one_file_that_loads_nothing(report: Path, page: Page) -> None:
 
 def test_every_score_and_parameter_is_printed(page: Page) -> None:
     words = {word.strip() for word in page.words}
-    printed = [*flat(episode.scores()["scores"]), *flat(episode.scores()["difficulty"])]
-    assert len(printed) > 25
+    printed = [item for part in ("scores", "difficulty", "details") for item in flat(episode.scores()[part])]
+    assert len(printed) > 40
     for keys, value in printed:
         assert number(value) in words, keys
     for keys, value in flat(episode.scenario()):
@@ -118,9 +118,12 @@ def test_sections_are_there(page: Page) -> None:
         "Frames",
         "Scoring thresholds",
         "Confusion of traces",
+        "A closer look",
+        "By distance",
+        "Whether covariances are right",
     ):
         assert heading in text
-    assert page.tags.count("svg") == 3 + 3 + 6
+    assert page.tags.count("svg") == 3 + 3 + 6 + 2
     assert "half of the car traces or more were never identified" in text
 
 
@@ -170,12 +173,14 @@ def test_nulls_say_why(found: list[episode.Step], tmp_path: Path) -> None:
     log = replace(episode.episode_log(found), has_boxes=False, traces=None)
     document = episode.scores()
     document["scores"] = {"hota": None, "identification": {"car_recall": None, "confusion": None}}
+    document["details"]["conventions"]["amodal"]["hota"] = None
     with recorder(tmp_path) as running:
         running.frame(found[0][0], found[0][1])
         page = Page(running.finish(log, document, episode.scenario()).read_text("utf-8"))
     text = " ".join(page.words)
     assert "This tracker gives no boxes." in text
     assert "This tracker shows no traces." in text
+    assert "A closer look" not in text
 
 
 def test_hostile_names_are_escaped(found: list[episode.Step], tmp_path: Path) -> None:

@@ -42,6 +42,7 @@ def document() -> dict[str, Any]:
             "frames": 4 * episode.FRAMES,
             "scores": over_seeds(found),
             "difficulty": over_seeds([episode.scores()["difficulty"]] * len(SEEDS)),
+            "details": over_seeds([shaken(episode.scores()["details"], rng, 1.0) for _ in SEEDS]),
         }
         for name, found in scores.items()
     ]
@@ -75,6 +76,24 @@ def test_summary_has_every_mean_interval_and_link(document: dict[str, Any], tmp_
     assert "seed-4/tracker%201/report.html" in links
     assert "i" not in page.tags or "Mine" not in page.words
     assert [file.name for file in tmp_path.iterdir()] == ["summary.html"]
+
+
+def test_summary_looks_closer_at_every_tracker_that_has_boxes(
+    document: dict[str, Any], tmp_path: Path
+) -> None:
+    document["runs"][1]["details"]["conventions"]["amodal"]["hota"] = None
+    document["runs"][2]["details"]["consistency"] = None
+    page = Page(write_summary(tmp_path, document, {}).read_text("utf-8"))
+    words = [word.strip() for word in page.words]
+    for run in document["runs"]:
+        shown = run["tracker"] != "in-car:paper"
+        assert (f"{run['tracker']}: recall" in words) == shown
+        assert (f"{run['tracker']}: visible boxes" in words) == shown
+        for keys, value in flat(run["details"]["strata"]):
+            if keys[-1] != "boxes" and shown:
+                assert number(value) in words, keys
+    assert {"–", str(4 * 211), "n = 7108"} <= set(words), "boxes are summed over seeds"
+    assert words.count("mean NEES") == 1
 
 
 def test_one_seed_of_several_trackers(document: dict[str, Any], tmp_path: Path) -> None:

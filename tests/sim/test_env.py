@@ -15,8 +15,10 @@ from gymnasium.vector import AsyncVectorEnv
 from gymnasium.wrappers import RecordVideo
 
 import sim  # registers the environments
+from sim.aerial import photo
 from sim.camera import ground_homography
 from sim.env import SceneEnv
+from sim.render import ground, sky
 from sim.render.context import RenderUnavailableError, context
 from sim.scenes import make_scene
 from sim.simulation import Simulation
@@ -34,6 +36,11 @@ SPARSE = {
     "InCar": ("traffic.density=3", "traffic.oncoming_density=2", "scenery.density=0.1"),
     "MotorcycleLane": ("scenery.density=0.1",),
 }
+COARSE = {
+    sky: {"_WIDTH": 256, "_HEIGHT": 32, "_PLANE": 128},
+    ground: {"_ALONG": 256, "_ACROSS": 64},
+    photo: {"TEXEL": 1.8},
+}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -42,6 +49,20 @@ def _needs_gl():
         context()
     except RenderUnavailableError as error:
         pytest.skip(str(error))
+
+
+@pytest.fixture
+def fine():
+    """Skies and grounds are painted in full, as other processes do."""
+
+
+@pytest.fixture(autouse=True)
+def _coarse(request, monkeypatch):
+    """To paint skies and grounds takes longest of all, and nobody here looks at them closely."""
+    if "fine" not in request.fixturenames:
+        for module, constants in COARSE.items():
+            for name, value in constants.items():
+                monkeypatch.setattr(module, name, value)
 
 
 def small(name: str, *overrides: str, **kwargs) -> SceneEnv:
@@ -106,6 +127,7 @@ def test_an_episode_of_random_actions_is_whole(name):
     assert env.metadata["render_fps"] == env.course.rate == 30
 
 
+@pytest.mark.usefixtures("fine")
 @pytest.mark.parametrize("name", ALL)
 def test_a_seed_is_a_rollout_in_one_process_and_in_others(name):
     one, two = small(name), small(name)

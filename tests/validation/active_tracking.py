@@ -3,11 +3,14 @@
 Run with ``python -m tests.validation.active_tracking [--seeds A:B] [--seconds S] [--tracker NAME]``. In each
 drive the platform begins over the convoy of `aerial-convoy`. The controller reads ``info["tracks"]`` alone;
 left alone, the platform hovers. Printed are, for each drive and over all, with bootstrap intervals of the
-paired differences:
+paired differences, of each frame in the mean:
 
-    followed   vehicles a frame that are scored and have a track's box on them (IoU .5)
-    in view    vehicles of the convoy of which .3 or more can be seen, a frame
-    reward     the environment's: F1 of the tracks' boxes, which says nothing of how many there are
+    reward     the environment's: F1 of the tracks' boxes, in which the convoy's vehicles that are out of the
+               picture are misses
+    F1         the same without these: of whatever is in the picture, however little that is
+    convoy     vehicles of the convoy that are scored and have a track's box on them (IoU .5)
+    followed   the same of all vehicles, whoever drives by
+    in view    vehicles of the convoy of which .3 or more can be seen
 """
 
 from __future__ import annotations
@@ -21,14 +24,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenarios.in_the_loop import TrackerInTheLoop
+from scenarios.score.frames import Selector
 from scenarios.score.params import ScoringParams
-from scenarios.score.preprocess import confirmed, select_from_above
 from scenarios.score.statistics import interval
 from sim.truth.snapshot import Snapshot
-from tracker.boxes import iou
+from sim.world import Role
 from tracker.types import Status, Tracks
 
-MEASURES = ("followed", "in view", "reward")
+MEASURES = ("reward", "F1", "convoy", "followed", "in view")
 SCORING = ScoringParams()
 UP = np.array([1.0, -1.0])
 """Pictures count rows downward; the platform's action is positive toward the upper edge."""
@@ -98,36 +101,28 @@ class Centring:
 def fly(env: TrackerInTheLoop, seed: int, controller: Centring | None) -> dict[str, float]:
     """Return what one drive measures, frame by frame in the mean."""
     info = env.reset(seed=seed)[1]
-    convoy = convoy_of(env)
     rows, over = [], False
     while not over:
         action = np.zeros(4, np.float32) if controller is None else controller.act(info["tracks"])
         _, reward, terminated, truncated, info = env.step(action)
-        rows.append((followed(info["truth"], info["tracks"]), in_view(info["truth"], convoy), reward))
+        rows.append((reward, *measure(info["truth"], info["tracks"])))
         over = terminated or truncated
     return dict(zip(MEASURES, np.mean(rows, axis=0).tolist(), strict=True))
 
 
-def convoy_of(env: TrackerInTheLoop) -> NDArray[np.uint32]:
-    """Return the ids of the convoy's vehicles: they come before all others into the world."""
-    scene = env.unwrapped
-    vehicles = scene.observation.state.vehicles
-    return np.sort(vehicles.ids)[: scene.course.params.traffic.convoy]
-
-
-def followed(truth: Snapshot, tracks: Tracks) -> int:
-    """Count the scored vehicles that have a confirmed track on them; boxes of either lie apart."""
+def measure(truth: Snapshot, tracks: Tracks) -> tuple[float, int, int, int]:
+    """Return a frame's measures, all but the reward; a frame with nothing in it has an F1 of 0."""
     width, height = truth.camera.width, truth.camera.height
-    selection = select_from_above(truth.vehicles, width=width, height=height, params=SCORING)
-    _, found = confirmed(tracks, width, height)
-    overlap = iou(selection.boxes[selection.scored], found)
-    return int((overlap >= SCORING.match_iou).any(axis=1).sum())
-
-
-def in_view(truth: Snapshot, convoy: NDArray[np.uint32]) -> int:
-    """Count the vehicles of the convoy of which enough can be seen to be scored."""
+    selector = Selector("aerial", rate=truth.state.rate, width=width, height=height, params=SCORING)
+    frame = selector.take(truth.vehicles, tracks)
+    scored, claimed, overlap = selector.compare(frame)
+    # Boxes of vehicles lie apart, and so do those of tracks.
+    found = scored[(overlap >= SCORING.match_iou).any(axis=1)]
     vehicles = truth.vehicles
-    return int((np.isin(vehicles.ids, convoy) & (vehicles.visible >= SCORING.min_visible)).sum())
+    convoy = vehicles.roles == Role.CONVOY
+    f1 = 2 * len(found) / max(1, len(scored) + len(claimed))
+    followed = int(np.isin(found, vehicles.ids[convoy]).sum())
+    return f1, followed, len(found), int((convoy & (vehicles.visible >= SCORING.min_visible)).sum())
 
 
 def compare(seeds: Sequence[int], *, seconds: float, tracker: str) -> dict[str, dict[str, list[float]]]:

@@ -49,5 +49,5 @@ def test_without_tracks_it_flies_on():
 @pytest.mark.slow
 def test_the_controller_keeps_more_of_the_convoy_in_view_and_followed():
     found = compare(range(500, 503), seconds=14.0, tracker="aerial")
-    for name in ("followed", "in view"):
+    for name in ("reward", "convoy", "in view"):
         assert (np.subtract(found["centred"][name], found["fixed"][name]) > 0).all()
