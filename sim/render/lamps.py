@@ -95,8 +95,8 @@ class LampPlan:
         brake = (lamps & Lamps.BRAKE) != 0
         carried, parts = [], []
         for places, on, aim, tint, power, strength in (
-            (self._tail, brake, (-cos, -sin, level), _BRAKE, 1.0, 6.0),
-            (self._tail, ((lamps & Lamps.TAIL) != 0) & ~brake, (-cos, -sin, level), _TAIL, 1.0, 5.0),
+            (self._tail, brake, (-cos, -sin, level), _BRAKE, 1.0, 2.0),
+            (self._tail, ((lamps & Lamps.TAIL) != 0) & ~brake, (-cos, -sin, level), _TAIL, 1.0, 1.0),
             (self._head, (lamps & Lamps.HEAD) != 0, (cos, sin, level - 0.05), _HEAD, 28.0, 14.0),
             (self._street, np.full(len(rows), streets), (level, level, -one), _STREET, 2.0, 90.0),
         ):
@@ -193,7 +193,7 @@ def halos(burning: Burning, camera: Camera, *, night: bool) -> NDArray[np.void]:
     scale = camera.focal / 800.0
     out["position"] = burning.position[rows]
     glare = (
-        (9.0 + 330.0 / (distance[rows] + 3.0))
+        (5.0 + 330.0 / (distance[rows] + 3.0))
         * np.sqrt(bright[rows])
         * np.minimum(1.0, (220.0 / distance[rows]) ** 0.7)
     )

@@ -17,7 +17,7 @@ float own_beam(vec3 at, vec3 normal) {
     float cut = -0.012 + 0.03 * clamp(aside * 4.0, 0.0, 1.0);
     float below = 1.0 - smoothstep(cut - 0.012, cut + 0.012, up);
     float spread = exp(min(up - cut, 0.0) * 34.0 - aside * aside * 7.0);
-    float lobe = spread * mix(0.045, 1.0, below) * step(0.0, from.z);
+    float lobe = spread * mix(0.03, 1.0, below) * step(0.0, from.z);
     float facing = max(-dot(normal, at) / length(at), 0.0);
     return u_beam * lobe * facing / (reach * reach);
 }
@@ -31,6 +31,8 @@ vec3 lamplight(vec3 at, vec3 normal, float within) {
         float square = dot(away, away) + 0.3;
         vec3 ray = away * inversesqrt(square);
         float lobe = pow(max(dot(ray, u_lamp_aim[i].xyz), 0.001), u_lamp_aim[i].w);
+        // Headlamps, whose beams are narrow, are dipped.
+        lobe *= u_lamp_aim[i].w > 10.0 ? mix(1.0, 0.03, smoothstep(-0.024, 0.0, ray.z)) : 1.0;
         sum += u_lamp_colour[i] * (lobe * max(-dot(ray, normal), 0.0) / square);
     }
     return sum;
