@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 # How far the points of one body may move apart over the remembered time: px, and as a share of its width.
 BODY_PLAY, BODY_SHARE = 1.0, 0.02
@@ -63,3 +64,9 @@ def body_motion(position, flow, moved, ripe, middle, wide, growth, remembered): 
         scale = min(max(shared / max(power, LEAST_SPREAD), -MOST_GROWTH), MOST_GROWTH)
         trust = power / (power + SPREAD)
     return kept, _middle(flow), _middle(away), scale, trust
+
+
+def inward(relative: NDArray[np.float64], moved: NDArray[np.float64]) -> float:
+    """Return how far points (N, 2) from the focus of expansion that moved by (N, 2) came nearer to it, px."""
+    away = np.maximum(np.hypot(relative[:, 0], relative[:, 1]), 1.0)
+    return -float(np.median((moved * relative).sum(1) / away))

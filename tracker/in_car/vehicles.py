@@ -5,31 +5,36 @@ A box each, carried along by the points on it and held by the picture's outlines
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.in_car.body import body_motion
-from tracker.in_car.cues import cues
+from tracker.in_car.body import body_motion, inward
+from tracker.in_car.cues import Cue, cues
 from tracker.in_car.features import Picture
+from tracker.in_car.lamps import on_lamp
 from tracker.in_car.outline_odds import Trees, log_odds
 from tracker.in_car.outlines import outlines
 from tracker.in_car.points import PointStore
-from tracker.in_car.relief import RED, Relief, make_relief
+from tracker.in_car.relief import Relief, make_relief
 from tracker.in_car.yaw import EgoMotion
 from tracker.types import Status
 
 Floats = NDArray[np.float64]
 
 # Log odds of a vehicle at which it is confirmed, and below which it is given up.
-CONFIRM, REJECT = 2.5, -1.5
+CONFIRM, REJECT = 2.0, -1.5
 # Bounds of the log odds: old evidence must not outlast new evidence for too long.
 LOWEST, HIGHEST = -6.0, 5.0
 # Log odds of a single outline: at which a vehicle is begun; which neither raise nor lower a vehicle's; and
 # what one look may add or take.
-BEGIN, EVEN, MOST = 0.5, -1.0, 4.0
+BEGIN, EVEN, MOST = 0.5, -1.5, 4.0
+# The odds at which it is begun if its points agree, and sums of their log odds: so many speak for it, so few
+# against.
+AGREED, MANY, FEW = -0.5, 12.0, 1.0
 # Seconds before a vehicle is judged by how it moves.
 YOUNG = 0.2
 # Outlines are looked at once in so many frames.
@@ -41,16 +46,18 @@ PLAY, SIZE_PLAY = 0.06, 0.12
 BETTER, LOOKS = 2.0, 2
 # Overlap, over the smaller box, at which two boxes cannot both be vehicles; and at which none is begun.
 SAME, TAKEN = 0.55, 0.35
+# So near the frame's edge, px, a vehicle goes on beyond it.
+EDGE = 3.0
 # Seconds over which the points' evidence is worth once itself: the span of the displacements.
 CORRELATION = 0.35
 # Log odds from which a point may belong to a vehicle, and from which it may while the ego stands.
 LIKELY, UNCLEAR = 1.0, -0.5
-# Difference in redness, grey levels, between so many px around a point and so much wider surroundings, from
-# which on it may be on a tail lamp. Its vehicle may stand while the ego moves, and so move like the scenery.
-LAMP_RED, LAMP_REACH, AROUND = 25.0, 2, 10
 # Most growth, as a share of the size a frame, of a vehicle that was only ever seen cut off by the frame. It
 # overtakes, since one that is overtaken was seen whole before; scenery that the ego passes grows.
 PASSING_GROWTH = 0.003
+# How far, px over `CORRELATION` seconds, its points must have moved toward the focus of expansion before it
+# is sure, and how many they must be, over the root of what is seen of its width, px.
+INWARD, CROWDED = 3.0, 0.7
 # Ego speed below which a look tells less and less that the last one did not, m/s.
 WALK = 5.0
 
@@ -71,6 +78,7 @@ class Vehicle:
         members: Points that move with it.
         confirmed: Whether it ever was sure.
         whole: Whether the frame ever showed both its sides.
+        inward: How far its points moved toward the focus of expansion over `CORRELATION` seconds, px.
         rivals: Looks in a row at which another outline was better.
     """
 
@@ -85,6 +93,7 @@ class Vehicle:
     members: int = 0
     confirmed: bool = False
     whole: bool = False
+    inward: float = 0.0
     rivals: int = 0
 
     @property
@@ -146,7 +155,7 @@ class VehicleStore:
         """
         horizon = float(ego.focus[1])
         for vehicle in self.vehicles:
-            self._carry(vehicle, points, moved)
+            self._carry(vehicle, points, moved, picture.grey.shape[1], ego.focus)
         self.sighting = None
         if self._frame % SEARCH == 0:
             middle = float(ego.focus[0])
@@ -161,7 +170,7 @@ class VehicleStore:
         ripe = points.age >= 4
         # While the ego stands nothing moves, and what did not move against a vehicle may be one.
         least = LIKELY if speed > WALK else UNCLEAR
-        free = (points.evidence > least) | _on_lamp(relief, points.position)
+        free = (points.evidence > least) | on_lamp(relief, points.position)
         likely = ripe & free & (points.position[:, 1] > relief.horizon + 2.0)
         shape = len(relief.sums) - 1, relief.sums.shape[1] - 1
         expected = np.array([_outline(vehicle.box, *shape) for vehicle in self.vehicles]).reshape(-1, 3)
@@ -184,9 +193,11 @@ class VehicleStore:
             self._hold(vehicle, expected[index], windows, odds, index, relief, speed)
         first = len(self.vehicles)
         for index in first + np.argsort(-odds[first:], kind="stable"):
-            if odds[index] < BEGIN:
+            if odds[index] < AGREED:
                 break
-            self._begin(windows[index], points, likely & (points.owner == 0), relief.horizon)
+            speak = measured[index, [Cue.FOR, Cue.AGAINST]]
+            if odds[index] > BEGIN or (speak[0] > MANY and speak[1] < FEW):
+                self._begin(windows[index], points, likely, relief)
 
     def _hold(
         self,
@@ -200,12 +211,15 @@ class VehicleStore:
     ) -> None:
         """Pull a vehicle's box to the likeliest outline near it, and weigh it by that."""
         x0, x1, row = expected
+        height, width = len(relief.sums) - 1, relief.sums.shape[1] - 1
         wide = max(x1 - x0, 1.0)
         play = PLAY * wide + 1.0
         widths = np.log((windows[:, 2] - windows[:, 0]) / np.maximum(windows[:, 3] - relief.horizon, 1.0))
-        cut = x0 < 3.0 or x1 > relief.sums.shape[1] - 4.0
-        off = ((windows[:, 0] - x0) / play) ** 2 + ((windows[:, 2] - x1) / play) ** 2
-        off += ((windows[:, 3] - row) / play) ** 2
+        cut = x0 < EDGE or x1 > width - EDGE
+        # An end that was never seen may come into view anywhere.
+        unseen = np.array([x0 < EDGE, x1 > width - EDGE]) & (not vehicle.whole)
+        ends = ((windows[:, [0, 2]] - (x0, x1)) / play) ** 2
+        off = ((windows[:, 3] - row) / play) ** 2 + ends[:, ~unseen].sum(1)
         if not cut:
             off += ((widths - vehicle.log_width) / SIZE_PLAY) ** 2
         off[own] = 0.0
@@ -217,7 +231,9 @@ class VehicleStore:
             gain *= min(1.0, speed / WALK)
         vehicle.odds = float(np.clip(vehicle.odds + gain, LOWEST, HIGHEST))
         vehicle.whole = vehicle.whole or not cut
-        if vehicle.odds > CONFIRM and vehicle.age >= YOUNG * self._rate and vehicle.members >= 2:
+        least = 2 if vehicle.whole else CROWDED * math.sqrt(wide)
+        proven = vehicle.odds > CONFIRM and vehicle.age >= YOUNG * self._rate and vehicle.members >= least
+        if proven and (vehicle.whole or vehicle.inward > INWARD):
             vehicle.confirmed = True
         if odds[best] > 0.0:
             vehicle.missed = 0
@@ -225,12 +241,15 @@ class VehicleStore:
         gain = 0.6 if young else 0.35
         found = windows[best]
         step = gain * (found - vehicle.box)
-        height, width = len(relief.sums) - 1, relief.sums.shape[1] - 1
-        # Where the frame cuts it off its end is not seen.
-        if found[0] < 1.0 and vehicle.box[0] < 3.0:
-            step[0] = 0.0
-        if found[2] > width - 1.0 and vehicle.box[2] > width - 3.0:
-            step[2] = 0.0
+        for end, beyond, hidden in (
+            (0, vehicle.box[0] < EDGE, found[0] < 1.0),
+            (2, vehicle.box[2] > width - EDGE, found[2] > width - 1.0),
+        ):
+            # Where the frame cuts it off its end is not seen; one that comes into view is where it is seen.
+            if beyond and hidden:
+                step[end] = 0.0
+            elif beyond and not vehicle.whole:
+                step[end] = found[end] - vehicle.box[end]
         if found[3] > height - 3.0:
             step[3] = 0.0
         vehicle.box = vehicle.box + step
@@ -253,8 +272,8 @@ class VehicleStore:
             return
         vehicle.rivals = 0
 
-    def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats) -> None:
-        """Move the box with its points."""
+    def _carry(self, vehicle: Vehicle, points: PointStore, moved: Floats, width: int, focus: Floats) -> None:
+        """Move the box with its points, in a picture so many px wide."""
         own = np.flatnonzero((points.owner == vehicle.id) & (points.age >= 1))
         box = vehicle.box
         middle = np.array([0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])])
@@ -274,6 +293,7 @@ class VehicleStore:
             points.owner[own[~kept]] = 0
             vehicle.members = int(kept.sum())
         if vehicle.members:
+            vehicle.inward = inward(points.position[own[kept]] - focus, moved[own[kept]])
             vehicle.growth += 0.3 * trust * (growth - vehicle.growth)
             middle_shift = shift - vehicle.growth * away
             vehicle.velocity += 0.3 * (middle_shift - vehicle.velocity)
@@ -284,7 +304,14 @@ class VehicleStore:
             vehicle.missed += 1
         middle += middle_shift
         half = 0.5 * np.array([box[2] - box[0], box[3] - box[1]]) * (1.0 + vehicle.growth)
-        vehicle.box = np.concatenate([middle - half, middle + half])
+        carried = np.concatenate([middle - half, middle + half])
+        if not vehicle.whole:
+            # What comes into the picture goes on beyond its edge until an outline shows its end.
+            if box[0] < EDGE:
+                carried[0] = min(carried[0], box[0])
+            if box[2] > width - EDGE:
+                carried[2] = max(carried[2], box[2])
+        vehicle.box = carried
 
     def _end(self, shape: tuple[int, ...], points: PointStore, horizon: float) -> None:
         """Give up vehicles that left, were lost, never proved themselves, or are another's part."""
@@ -333,17 +360,20 @@ class VehicleStore:
             fresh &= (points.evidence > 0.3) | (moving < 2.0)
             points.owner[fresh] = vehicle.id
 
-    def _begin(self, box: Floats, points: PointStore, free: NDArray[np.bool_], horizon: float) -> None:
+    def _begin(self, box: Floats, points: PointStore, likely: NDArray[np.bool_], relief: Relief) -> None:
         """Begin a vehicle in an outline (4,) that no other one holds and that has points of its own."""
         if any(covered(box, other.box) > TAKEN for other in self.vehicles):
             return
-        wide, tall = box[2] - box[0], box[3] - box[1]
+        wide, tall, width = box[2] - box[0], box[3] - box[1], relief.sums.shape[1] - 1
         x, y = points.position.T
-        members = free & (x > box[0] - 0.05 * wide) & (x < box[2] + 0.05 * wide)
-        members &= (y > box[1] - 0.05 * tall) & (y < box[3] + 0.05 * tall)
-        if members.sum() < 1:
+        inside = likely & (x > box[0] - 0.05 * wide) & (x < box[2] + 0.05 * wide)
+        inside &= (y > box[1] - 0.05 * tall) & (y < box[3] + 0.05 * tall)
+        members = inside & (points.owner == 0)
+        # Cut off by the frame it may be of any width: the points of another vehicle do not speak for it.
+        cut = box[0] < EDGE or box[2] > width - EDGE
+        if not members.any() or (cut and 2 * members.sum() < inside.sum()):
             return
-        log_width = float(np.log(wide / (box[3] - horizon)))
+        log_width = float(np.log(wide / (box[3] - relief.horizon)))
         vehicle = Vehicle(id=self._next_id, box=box.copy(), log_width=log_width)
         self._next_id += 1
         vehicle.velocity = np.median(points.flow[members], axis=0)
@@ -357,23 +387,6 @@ def _outline(box: Floats, height: int, width: int) -> tuple[float, float, float]
     x0 = min(max(float(box[0]), 0.0), width - 1.0)
     x1 = min(max(float(box[2]), x0 + 1.0), float(width))
     return x0, x1, min(float(box[3]), height - 1.0)
-
-
-def _on_lamp(relief: Relief, position: Floats) -> NDArray[np.bool_]:
-    """Tell which points (N, 2) may be on a tail lamp (N,): redder than what is around."""
-    column, row = position.astype(np.int64).T
-    near, wide = (_redness(relief, column, row, reach) for reach in (LAMP_REACH, AROUND))
-    return np.asarray(near - wide > LAMP_RED)
-
-
-def _redness(relief: Relief, column: NDArray[np.int64], row: NDArray[np.int64], reach: int) -> Floats:
-    """Return the mean redness (N,) within so many px of pixels (N,)."""
-    red = relief.sums[..., RED]
-    height, width = red.shape
-    x0, x1 = (column - reach).clip(0), (column + reach + 1).clip(0, width - 1)
-    y0, y1 = (row - reach).clip(0), (row + reach + 1).clip(0, height - 1)
-    total = 0.5 * (red[y1, x1] - red[y0, x1] - red[y1, x0] + red[y0, x0])
-    return np.asarray(total / ((x1 - x0) * (y1 - y0)))
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker.in_car.body import BODY_PLAY, BODY_SHARE, STEP_PLAY, STEP_SHARE, body_motion
+from tracker.in_car.body import BODY_PLAY, BODY_SHARE, STEP_PLAY, STEP_SHARE, body_motion, inward
 
 
 def plainly(position, flow, moved, ripe, middle, wide, growth, remembered):
@@ -58,3 +58,11 @@ def test_a_point_that_stays_behind_is_not_the_bodys():
     assert shift == pytest.approx([2.0, 0.5], abs=0.05)
     assert growth == pytest.approx(0.003, abs=1e-6)
     assert 0.0 < trust < 1.0
+
+
+def test_inward_is_the_median_way_toward_the_focus():
+    rng = np.random.default_rng(7)
+    relative, moved = rng.normal(0, 80, (30, 2)), rng.normal(0, 3, (30, 2))
+    ways = [-np.dot(m, r) / np.hypot(*r) for r, m in zip(relative, moved, strict=True)]
+    assert inward(relative, moved) == pytest.approx(np.median(ways))
+    assert inward(relative, -0.1 * relative) > 0.0

@@ -15,19 +15,12 @@ from tracker import registry
 from tracker.in_car.features import Picture
 from tracker.in_car.outline_odds import learnt_trees
 from tracker.in_car.points import PointStore
-from tracker.in_car.vehicles import (
-    AROUND,
-    LAMP_REACH,
-    LAMP_RED,
-    Vehicle,
-    VehicleStore,
-    _on_lamp,
-    covered,
-)
+from tracker.in_car.vehicles import INWARD, Vehicle, VehicleStore, covered
 from tracker.in_car.yaw import EgoMotion
 
 RATE = 30.0
 HORIZON = 110.0
+WIDTH, FOCUS = 320, np.array([160.0, HORIZON])
 
 
 def points_at(position, owner):
@@ -73,7 +66,7 @@ def test_a_box_moves_and_grows_with_its_points():
         points.flow = shift + growth * (points.position - middle)
         points.position = points.position + points.flow
         # What it would have moved over the remembered time at this pace.
-        store._carry(vehicle, points, points.flow * RATE * 0.35)
+        store._carry(vehicle, points, points.flow * RATE * 0.35, WIDTH, FOCUS)
     grown = np.exp(90 * np.log1p(growth))
     assert vehicle.members == 20
     assert vehicle.missed == 0
@@ -87,7 +80,7 @@ def test_a_point_that_does_not_move_along_is_let_go():
     points = points_at(np.random.default_rng(1).uniform(box[:2], box[2:], (9, 2)), owner=1)
     points.flow[4] = (5.0, 0.0)
     store, vehicle = VehicleStore(rate=RATE, trees=learnt_trees()), vehicle_at(box)
-    store._carry(vehicle, points, points.flow)
+    store._carry(vehicle, points, points.flow, WIDTH, FOCUS)
     assert points.owner.tolist() == [1] * 4 + [0] + [1] * 4
     assert vehicle.box == pytest.approx(box)
 
@@ -98,9 +91,39 @@ def test_without_points_a_vehicle_goes_on_and_is_missed():
         vehicle_at((120, 105, 165, 140), velocity=np.array([2.0, 0])),
     )
     points = points_at(np.empty((0, 2)), owner=0)
-    store._carry(vehicle, points, np.empty((0, 2)))
+    store._carry(vehicle, points, np.empty((0, 2)), WIDTH, FOCUS)
     assert vehicle.missed == 1
     assert vehicle.box == pytest.approx((122, 105, 167, 140))
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [((0, 105, 60, 150), (0, 105, 62, 150)), ((250, 105, 320, 150), (248, 105, 320, 150))],
+)
+def test_what_comes_into_the_picture_goes_on_beyond_its_edge(before, after):
+    toward = 2.0 if before[0] == 0 else -2.0
+    points = points_at(np.random.default_rng(4).uniform(before[:2], before[2:], (9, 2)), owner=1)
+    points.flow[:] = (toward, 0.0)
+    store, vehicle = VehicleStore(rate=RATE, trees=learnt_trees()), vehicle_at(before)
+    store._carry(vehicle, points, points.flow * RATE * 0.35, WIDTH, FOCUS)
+    assert vehicle.box == pytest.approx(after)
+    assert vehicle.inward > INWARD
+    seen = vehicle_at(before, whole=True)
+    store._carry(seen, points, points.flow * RATE * 0.35, WIDTH, FOCUS)
+    assert seen.box == pytest.approx(np.add(before, (toward, 0, toward, 0)))
+
+
+@pytest.mark.parametrize(("left", "others", "vehicles"), [(0, 4, 2), (0, 12, 1), (20, 12, 2)])
+def test_points_of_one_vehicle_do_not_begin_another_that_is_cut_off(left, others, vehicles):
+    store = VehicleStore(rate=RATE, trees=learnt_trees())
+    store.vehicles, store._next_id = [vehicle_at((155, 120, 170, 140))], 2
+    free = np.random.default_rng(5).uniform((22, 112), (140, 178), (8, 2))
+    held = np.random.default_rng(6).uniform((155, 120), (160, 140), (others, 2))
+    points = points_at(np.concatenate([free, held]), owner=1)
+    points.owner[:8] = 0
+    scene = relief_of(np.zeros((240, WIDTH), np.uint8))
+    store._begin(np.array([left, 110.0, 160, 180]), points, np.ones(8 + others, bool), scene)
+    assert len(store.vehicles) == vehicles
 
 
 @pytest.mark.parametrize(
@@ -158,26 +181,6 @@ def test_nothing_is_begun_where_no_point_moves_like_a_vehicle():
     for _ in range(6):
         store.step(picture, points, np.zeros((30, 2)), ego, 4.0)
     assert store.vehicles == []
-
-
-def test_points_on_lamps_are_redder_than_what_is_around():
-    rng = np.random.default_rng(3)
-    red = rng.integers(0, 30, (60, 80)).astype(np.uint8)
-    red[30:36, 20:26] = 140
-    relief = relief_of(np.zeros_like(red), red=red)
-    position = rng.uniform((0, 0), (80, 60), (200, 2))
-    position[0] = 23.0, 33.0
-    expected = []
-    for column, row in position.astype(int):
-        near, wide = (
-            red[max(row - k, 0) : row + k + 1, max(column - k, 0) : column + k + 1].mean()
-            for k in (LAMP_REACH, AROUND)
-        )
-        expected.append(near - wide > LAMP_RED)
-    found = _on_lamp(relief, position)
-    np.testing.assert_array_equal(found, expected)
-    assert found[0]
-    assert found.mean() < 0.1
 
 
 @pytest.fixture(scope="module")
