@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 # Least height of the horizon above a vehicle's contact row, as a share of the picture's width: farther
 # ones are too small to be told from anything else.
-FARTHEST = 0.012
+FARTHEST = 0.0145
 # Rows below the horizon, as a share of the width, from which on a point that stands still in the picture is
 # no vehicle's.
 NEAR_ROWS = 0.11

@@ -1,7 +1,4 @@
-"""The vehicles that are tracked.
-
-A box each, carried along by the points on it and held by the picture's outlines.
-"""
+"""The vehicles that are tracked: a box each, carried by the points on it and held by the outlines."""
 
 from __future__ import annotations
 
@@ -26,12 +23,12 @@ from tracker.types import Status
 Floats = NDArray[np.float64]
 
 # Log odds of a vehicle at which it is confirmed, and below which it is given up.
-CONFIRM, REJECT = 2.0, -1.5
+CONFIRM, REJECT = 2.5, -1.5
 # Bounds of the log odds: old evidence must not outlast new evidence for too long.
 LOWEST, HIGHEST = -6.0, 5.0
 # Log odds of a single outline: at which a vehicle is begun; which neither raise nor lower a vehicle's; and
 # what one look may add or take.
-BEGIN, EVEN, MOST = 0.5, -1.5, 4.0
+BEGIN, EVEN, MOST = 0.5, -1.0, 4.0
 # The odds at which it is begun if its points agree, and sums of their log odds: so many speak for it, so few
 # against.
 AGREED, MANY, FEW = -0.5, 12.0, 1.0
@@ -369,9 +366,9 @@ class VehicleStore:
         inside = likely & (x > box[0] - 0.05 * wide) & (x < box[2] + 0.05 * wide)
         inside &= (y > box[1] - 0.05 * tall) & (y < box[3] + 0.05 * tall)
         members = inside & (points.owner == 0)
-        # Cut off by the frame it may be of any width: the points of another vehicle do not speak for it.
-        cut = box[0] < EDGE or box[2] > width - EDGE
-        if not members.any() or (cut and 2 * members.sum() < inside.sum()):
+        # The points of another vehicle do not speak for it, least of all where the frame hides how wide it is.
+        share = 2 if box[0] < EDGE or box[2] > width - EDGE else 3
+        if not members.any() or share * members.sum() < inside.sum():
             return
         log_width = float(np.log(wide / (box[3] - relief.horizon)))
         vehicle = Vehicle(id=self._next_id, box=box.copy(), log_width=log_width)
