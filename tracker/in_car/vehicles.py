@@ -366,7 +366,7 @@ class VehicleStore:
         inside = likely & (x > box[0] - 0.05 * wide) & (x < box[2] + 0.05 * wide)
         inside &= (y > box[1] - 0.05 * tall) & (y < box[3] + 0.05 * tall)
         members = inside & (points.owner == 0)
-        # The points of another vehicle do not speak for it, least of all where the frame hides how wide it is.
+        # The points of another vehicle do not speak for it, least where the frame hides how wide it is.
         share = 2 if box[0] < EDGE or box[2] > width - EDGE else 3
         if not members.any() or share * members.sum() < inside.sum():
             return
