@@ -13,6 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+Floats = NDArray[np.float64]
+
 REACH = 1
 """Half side of the window, px."""
 DARKEST, BRIGHTEST = 0.3, 0.95
@@ -28,7 +30,7 @@ BINS = (26, 18)
 EDGE = 7
 """Side of the neighbourhood, px, in which a shadow may be uneven."""
 FADING = 0.98
-DARKER, OFF_TINT = 0.2, 0.12
+DARKER, OFF_TINT = 0.1, 0.12
 """How much darker than the mode a shadow may be, and how far off its tint; what is brighter is its rim."""
 
 
@@ -81,19 +83,32 @@ def darkness(image, background, mask):  # type: ignore[no-untyped-def]
     return found
 
 
-def _histogram(ratios: NDArray[np.float32], tints: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Return BINS counts of pixels (K,) by darkness and tint."""
+def _pull(ratios: NDArray[np.float32], tints: NDArray[np.float32], away: Floats) -> Floats:
+    """Return (2, *BINS) the sums by darkness and tint of how far pixels (K,) lie from their regions' middles.
+
+    Args:
+        ratios: (K,) to the background.
+        tints: (K,).
+        away: (2, K) px.
+    """
     row = ((ratios - DARKEST) * (BINS[0] / (BRIGHTEST - DARKEST))).astype(np.intp)
     column = ((tints - REDDEST) * (BINS[1] / (BLUEST - REDDEST))).astype(np.intp)
     at = np.minimum(row, BINS[0] - 1) * BINS[1] + np.minimum(column, BINS[1] - 1)
-    return np.bincount(at, minlength=BINS[0] * BINS[1]).reshape(BINS)
+    return np.array([np.bincount(at, part, BINS[0] * BINS[1]).reshape(BINS) for part in away])
+
+
+def _from_middles(labels: NDArray[np.int32], at: tuple[NDArray[np.intp], ...]) -> Floats:
+    """Return (2, K) how far right of and below the middles of their regions pixels lie, px."""
+    numbers = labels[at]
+    count = np.maximum(np.bincount(numbers), 1)
+    return np.array([part - (np.bincount(numbers, part) / count)[numbers] for part in at[::-1]])
 
 
 class Shadows:
     """Takes the cast shadows of one scene out of its foreground."""
 
     def __init__(self) -> None:
-        self._counts = np.zeros(BINS)
+        self._pull = np.zeros((2, *BINS))
 
     def remove(
         self, image: NDArray[np.uint8], background: NDArray[np.uint8], mask: NDArray[np.bool_]
@@ -106,13 +121,15 @@ class Shadows:
             mask: (H, W) raw foreground.
         """
         at = np.nonzero(mask)
+        _, labels = cv2.connectedComponents(mask.view(np.uint8))
         ratios, tints, spread = darkness(image, background, mask)[at].T
         likely = (ratios > 0.0) & (spread < UNEVEN)
-        self._counts = FADING * self._counts + _histogram(ratios[likely], tints[likely])
-        if not self._counts.any():
+        away = _from_middles(labels, at)[:, likely]
+        self._pull = FADING * self._pull + _pull(ratios[likely], tints[likely], away)
+        if not self._pull.any():
             return mask
-        smooth = cv2.blur(self._counts, (3, 3), borderType=cv2.BORDER_CONSTANT)
-        i, j = np.unravel_index(smooth.argmax(), smooth.shape)
+        smooth = [cv2.blur(part, (3, 3), borderType=cv2.BORDER_CONSTANT) for part in self._pull]
+        i, j = np.unravel_index(np.hypot(*smooth).argmax(), BINS)
         dark = DARKEST + (i + 0.5) / BINS[0] * (BRIGHTEST - DARKEST)
         tint = REDDEST + (j + 0.5) / BINS[1] * (BLUEST - REDDEST)
         # A rim has less of both: a part of the sun still shines there.
