@@ -27,11 +27,13 @@ BRIGHT = (0.3, 0.75)
 """Share of a region that is no shadow, where it tells of the offset."""
 LEAST_AREA = 60
 ENOUGH, MEMORY = 8, 120
+AREAS = 1000
+"""Regions whose median area is the usual one."""
 SOLID = 0.55
 """Share of its convex hull that is foreground, where a region is one vehicle with its shadow."""
 LARGE, LIT = 1.5, 0.3
 """Usual areas above which a region may be several vehicles, and share of it that must be lit to tell."""
-SMALLEST = 15
+SMALLEST = 30
 """Px of a region that is filled."""
 GRAIN = np.ones((3, 3), np.uint8)
 
@@ -47,9 +49,10 @@ class CastShadows:
         self.offset: Floats = np.zeros(2)
         self._shadows = Shadows()
         self._offsets: deque[Floats] = deque(maxlen=MEMORY)
+        self._areas: deque[int] = deque(maxlen=AREAS)
         self._frame = 0
 
-    def take_off(self, background: Background, mask: Mask, usual: float) -> Mask:
+    def take_off(self, background: Background, mask: Mask) -> Mask:
         """Return the foreground (H, W) of the last picture without the shadows, and learn where they fall.
 
         What is no darkened road is a vehicle's; so is what is foreground all along the offset from there. What
@@ -58,7 +61,6 @@ class CastShadows:
         Args:
             background: With the last picture laid on it.
             mask: (H, W) foreground of its view.
-            usual: Area of a vehicle, px; 0 where that is not known.
         """
         self._frame += 1
         lit = self._shadows.remove(background.laid, background.picture(), mask)
@@ -69,9 +71,11 @@ class CastShadows:
         lit = _as_mask(cv2.morphologyEx(lit.view(np.uint8), cv2.MORPH_CLOSE, GRAIN))
         labels = find_blobs(vehicles, SMALLEST).labels
         areas = np.bincount(labels.ravel())
-        joined = (areas > LARGE * usual) & (np.bincount(labels[lit], minlength=len(areas)) > LIT * areas)
+        self._areas.extend(areas[1:].tolist())
+        large = areas > LARGE * np.median(self._areas or [np.inf])
+        joined = large & (np.bincount(labels[lit], minlength=len(areas)) > LIT * areas)
         joined[0] = False
-        return np.where(joined[labels], filled(lit), vehicles) if usual else vehicles
+        return np.where(joined[labels], filled(lit), vehicles)
 
     def _learn(self, mask: Mask, lit: Mask) -> None:
         """Learn from regions of which a part is lit: how much farther the whole reaches to each side."""

@@ -103,8 +103,7 @@ class AerialTracker:
         sure = [_box(track.corners()) for track in self._tracks if track.went()]
         kept = np.array(sure).reshape(-1, 4)
         mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
-        vehicles = self._shadows.take_off(self._background, mask, float(self._usual.prod()))
-        blobs = find_blobs(vehicles, LEAST_AREA // 2)
+        blobs = find_blobs(self._shadows.take_off(self._background, mask), LEAST_AREA // 2)
         origin = self._background.origin + np.array(self._background.view[:2])
         places = np.array([track.state[:, 0] for track in self._tracks]).reshape(-1, 2) - origin
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
