@@ -109,7 +109,7 @@ class AerialTracker:
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
         sizes = np.array([track.size for track in self._tracks]).reshape(-1, 2)
         senior = np.array([track.confirmed for track in self._tracks], np.bool_)
-        own, beaten, left = outline(blobs.labels, self._single(blobs), senior, places, headings, sizes)
+        own, beaten, left = outline(blobs.labels, self._single(blobs, places), senior, places, headings, sizes)
         rest = find_blobs(left > 0, LEAST_AREA)
         sharper = contrast(rest, self._background)
         self._background.adopt(np.append(False, sharper < GHOST)[rest.labels])
@@ -151,12 +151,19 @@ class AerialTracker:
         """Return (2,) the length and width, px, of the largest vehicle, a lorry, as far as that is known."""
         return HUGE * self._usual if self._usual.any() else np.full(2, np.inf)
 
-    def _single(self, blobs: Blobs) -> NDArray[np.bool_]:
-        """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of the known."""
+    def _single(self, blobs: Blobs, places: Floats) -> NDArray[np.bool_]:
+        """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of those below the known.
+
+        Of the known at ``places`` (N, 2) themselves the sizes would tell less: two may be parts of one.
+        """
         sizes = free_outlines(blobs.labels, len(blobs)).sizes
-        known = np.array([track.size for track in self._tracks if track.confirmed and track.whole])
-        if len(known) > ENOUGH:
-            self._usual = np.median(known, axis=0)
+        known = np.array([track.confirmed and track.whole for track in self._tracks], np.bool_)
+        height, width = blobs.labels.shape
+        columns, rows = np.clip(places[known].astype(int), 0, [width - 1, height - 1]).T
+        below = blobs.labels[rows, columns]
+        below = below[below > 0]
+        if len(below) > ENOUGH:
+            self._usual = np.median(sizes[below - 1], axis=0)
         usual = self._usual if self._usual.any() or not len(sizes) else np.median(sizes, axis=0)
         return np.append(False, (sizes <= usual * LARGEST).all(1))
 
