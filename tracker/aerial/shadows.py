@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 
 EVERY = 5
 """Frames between two that are learnt from."""
-BRIGHT = (0.3, 0.75)
+BRIGHT = (0.3, 0.8)
 """Share of a region that is no shadow, where it tells of the offset."""
 LEAST_AREA = 60
 ENOUGH, MEMORY = 8, 120
@@ -55,8 +55,8 @@ class CastShadows:
     def take_off(self, background: Background, mask: Mask) -> Mask:
         """Return the foreground (H, W) of the last picture without the shadows, and learn where they fall.
 
-        What is no darkened road is a vehicle's; so is what is foreground all along the offset from there. What
-        is too large for one vehicle, and lit, is what is lit: the shadows in it join several.
+        What is no darkened road is a vehicle's; so is what is foreground all along the offset from there. Of
+        what is too large for one vehicle the lit parts are left, if they are much of it: shadows joined them.
 
         Args:
             background: With the last picture laid on it.
@@ -85,9 +85,9 @@ class CastShadows:
             region = blobs.labels[part] == k + 1
             rows, columns = np.nonzero(region & lit[part])
             if BRIGHT[0] < len(rows) / np.count_nonzero(region) < BRIGHT[1]:
-                low = np.array([columns.min(), rows.min()], float)
-                high = np.array([box[2] - box[0] - 1 - columns.max(), box[3] - box[1] - 1 - rows.max()], float)
-                self._offsets.append(high - low)
+                high, wide = region.shape
+                right = wide - 1 - columns.max() - columns.min()
+                self._offsets.append(np.array([right, high - 1 - rows.max() - rows.min()], float))
         if len(self._offsets) >= ENOUGH:
             self.offset = np.median(np.array(self._offsets), axis=0)
 

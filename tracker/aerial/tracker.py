@@ -109,7 +109,9 @@ class AerialTracker:
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
         sizes = np.array([track.size for track in self._tracks]).reshape(-1, 2)
         senior = np.array([track.confirmed for track in self._tracks], np.bool_)
-        own, beaten, left = outline(blobs.labels, self._single(blobs, places), senior, places, headings, sizes)
+        own, beaten, left = outline(
+            blobs.labels, self._single(blobs, places), senior, places, headings, sizes
+        )
         rest = find_blobs(left > 0, LEAST_AREA)
         sharper = contrast(rest, self._background)
         self._background.adopt(np.append(False, sharper < GHOST)[rest.labels])
