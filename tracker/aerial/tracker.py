@@ -35,9 +35,11 @@ BORDER = 3.0
 MOVED = 0.5
 """Lengths, its own or usual ones, that a track must have gone to be confirmed: what only seems to move
 does not go far."""
+SLOW, BUDGED = 10, 0.2
+"""Frames, and lengths gone in them, after which a new track may be a hidden vehicle that comes out slowly."""
 COMPACT = 0.6
 """Share of a rectangle that is foreground where a track begins: what is less may be two vehicles."""
-GHOST, CLEAR = -0.4, 0.0
+GHOST, CLEAR = -0.4, 0.3
 """Log ratio of gradients along an outline (`tracker.aerial.ghosts`) below which nothing is there, and above
 which a track begins."""
 ENOUGH = 5
@@ -221,13 +223,19 @@ class AerialTracker:
             and track.whole
             and track.hits >= tracks.CONFIRMING_HITS
             and track.pictures
-            and track.went(MOVED * max(1.0, self._usual[0] / track.size[0]))
+            and (self._moved(track) or (track.hits >= SLOW and track.went(BUDGED)))
         ]
-        for old, track in self._hidden.reacquire(new, to_mosaic):
+        known = self._hidden.reacquire(new, to_mosaic)
+        for old, track in known:
             self._join(old, track)
         for track in new:
-            track.confirmed = True
-            self._trajectories.append(track.id, self._tick, track.centre)
+            if self._moved(track) or any(track is other for _, other in known):
+                track.confirmed = True
+                self._trajectories.append(track.id, self._tick, track.centre)
+
+    def _moved(self, track: Track) -> bool:
+        """Tell whether a new track has gone so far that it must be a vehicle."""
+        return track.went(MOVED * max(1.0, self._usual[0] / track.size[0]))
 
     def _join(self, old: Track, track: Track) -> None:
         """Let a new track go on as an old one; the way between them is learnt."""
