@@ -2,8 +2,9 @@
 
 What a shadow falls on keeps its texture and nearly its colour: over a small window the ratio to the
 background image hardly varies (Jacques, Jung, Musse, Background subtraction and shadow detection in grayscale
-video sequences, SIBGRAPI 2005). Dark paint may do the same; but the shadows of all vehicles share one
-darkness, which is learnt as the mode of what looks like one.
+video sequences, SIBGRAPI 2005). Dark paint may do the same; but all vehicles have their shadows on one side
+and of one darkness. So the darkness is learnt that pulls the most to one side, seen from the middles of
+regions: paint of many colours pulls little to the other.
 """
 
 from __future__ import annotations
@@ -26,12 +27,12 @@ GREENEST = 0.08
 UNEVEN = 0.12
 """Greatest relative standard deviation of the ratio in the window."""
 BINS = (26, 18)
-"""Of the histogram of darkness and tint."""
+"""Of darkness and tint."""
 EDGE = 7
 """Side of the neighbourhood, px, in which a shadow may be uneven."""
 FADING = 0.98
 DARKER, OFF_TINT = 0.1, 0.12
-"""How much darker than the mode a shadow may be, and how far off its tint; what is brighter is its rim."""
+"""How much darker than the learnt one a shadow may be, and how far off its tint; its rim is brighter."""
 
 
 @njit(cache=True)
