@@ -38,15 +38,14 @@ def main(argv: list[str] | None = None) -> list[Line]:
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=5.0, help="length of a drive")
     seconds = parser.parse_args(argv or []).seconds
-    return [
-        Line(
-            what=f"generate, frames a second, {name}, {jobs} job{'s' if jobs > 1 else ''}",
-            measured=write(name, seconds, jobs),
-        )
-        for name in SCENARIOS
-        for jobs in JOBS
-    ]
+    lines = []
+    for name in SCENARIOS:
+        for jobs in JOBS:
+            what = f"generate, frames a second, {name}, {jobs} job{'s' if jobs > 1 else ''}"
+            lines.append(Line(what=what, measured=write(name, seconds, jobs)))
+            print(table(lines[-1:]), flush=True)
+    return lines
 
 
 if __name__ == "__main__":
-    print(table(main(sys.argv[1:])))
+    main(sys.argv[1:])

@@ -2,8 +2,9 @@
 
 What a shadow falls on keeps its texture and nearly its colour: over a small window the ratio to the
 background image hardly varies (Jacques, Jung, Musse, Background subtraction and shadow detection in grayscale
-video sequences, SIBGRAPI 2005). Dark paint may do the same; but the shadows of all vehicles share one
-darkness, which is learnt as the mode of what looks like one.
+video sequences, SIBGRAPI 2005). Dark paint may do the same; but all vehicles have their shadows on one side
+and of one darkness. So the darkness is learnt that pulls the most to one side, seen from the middles of
+regions: paint of many colours pulls little to the other.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 REACH = 1
 """Half side of the window, px."""
@@ -24,12 +27,12 @@ GREENEST = 0.08
 UNEVEN = 0.12
 """Greatest relative standard deviation of the ratio in the window."""
 BINS = (26, 18)
-"""Of the histogram of darkness and tint."""
+"""Of darkness and tint."""
 EDGE = 7
 """Side of the neighbourhood, px, in which a shadow may be uneven."""
 FADING = 0.98
-DARKER, OFF_TINT = 0.2, 0.12
-"""How much darker than the mode a shadow may be, and how far off its tint; what is brighter is its rim."""
+DARKER, OFF_TINT = 0.1, 0.12
+"""How much darker than the learnt one a shadow may be, and how far off its tint; its rim is brighter."""
 
 
 @njit(cache=True)
@@ -81,19 +84,32 @@ def darkness(image, background, mask):  # type: ignore[no-untyped-def]
     return found
 
 
-def _histogram(ratios: NDArray[np.float32], tints: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Return BINS counts of pixels (K,) by darkness and tint."""
+def _pull(ratios: NDArray[np.float32], tints: NDArray[np.float32], away: Floats) -> Floats:
+    """Return (2, *BINS) the sums by darkness and tint of how far pixels (K,) lie from their regions' middles.
+
+    Args:
+        ratios: (K,) to the background.
+        tints: (K,).
+        away: (2, K) px.
+    """
     row = ((ratios - DARKEST) * (BINS[0] / (BRIGHTEST - DARKEST))).astype(np.intp)
     column = ((tints - REDDEST) * (BINS[1] / (BLUEST - REDDEST))).astype(np.intp)
     at = np.minimum(row, BINS[0] - 1) * BINS[1] + np.minimum(column, BINS[1] - 1)
-    return np.bincount(at, minlength=BINS[0] * BINS[1]).reshape(BINS)
+    return np.array([np.bincount(at, part, BINS[0] * BINS[1]).reshape(BINS) for part in away])
+
+
+def _from_middles(labels: NDArray[np.int32], at: tuple[NDArray[np.intp], ...]) -> Floats:
+    """Return (2, K) how far right of and below the middles of their regions pixels lie, px."""
+    numbers = labels[at]
+    count = np.maximum(np.bincount(numbers), 1)
+    return np.array([part - (np.bincount(numbers, part) / count)[numbers] for part in at[::-1]])
 
 
 class Shadows:
     """Takes the cast shadows of one scene out of its foreground."""
 
     def __init__(self) -> None:
-        self._counts = np.zeros(BINS)
+        self._pull = np.zeros((2, *BINS))
 
     def remove(
         self, image: NDArray[np.uint8], background: NDArray[np.uint8], mask: NDArray[np.bool_]
@@ -106,13 +122,15 @@ class Shadows:
             mask: (H, W) raw foreground.
         """
         at = np.nonzero(mask)
+        _, labels = cv2.connectedComponents(mask.view(np.uint8))
         ratios, tints, spread = darkness(image, background, mask)[at].T
         likely = (ratios > 0.0) & (spread < UNEVEN)
-        self._counts = FADING * self._counts + _histogram(ratios[likely], tints[likely])
-        if not self._counts.any():
+        away = _from_middles(labels, at)[:, likely]
+        self._pull = FADING * self._pull + _pull(ratios[likely], tints[likely], away)
+        if not self._pull.any():
             return mask
-        smooth = cv2.blur(self._counts, (3, 3), borderType=cv2.BORDER_CONSTANT)
-        i, j = np.unravel_index(smooth.argmax(), smooth.shape)
+        smooth = [cv2.blur(part, (3, 3), borderType=cv2.BORDER_CONSTANT) for part in self._pull]
+        i, j = np.unravel_index(np.hypot(*smooth).argmax(), BINS)
         dark = DARKEST + (i + 0.5) / BINS[0] * (BRIGHTEST - DARKEST)
         tint = REDDEST + (j + 0.5) / BINS[1] * (BLUEST - REDDEST)
         # A rim has less of both: a part of the sun still shines there.

@@ -34,7 +34,7 @@ SCALES = (0.6, 2.0)
 brake, and there nobody can be rehearsed; and what is no vehicle is rehearsed, too."""
 RIM = 10.0
 """Px at the picture's border where nothing is sure to be seen."""
-INSIDE, ENTERING = 6e-6, 4e-5
+INSIDE, ENTERING = 2e-5, 4e-5
 """Vehicles never seen before that turn up, a px^2, inside the picture and where they come in."""
 ENTRY = 45.0
 """Px of the border where vehicles come in."""

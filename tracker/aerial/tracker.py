@@ -35,9 +35,11 @@ BORDER = 3.0
 MOVED = 0.5
 """Lengths, its own or usual ones, that a track must have gone to be confirmed: what only seems to move
 does not go far."""
+SLOW, BUDGED = 10, 0.2
+"""Frames, and lengths gone in them, after which a new track may be a hidden vehicle that comes out slowly."""
 COMPACT = 0.6
 """Share of a rectangle that is foreground where a track begins: what is less may be two vehicles."""
-GHOST, CLEAR = -0.4, 0.0
+GHOST, CLEAR = -0.4, 0.3
 """Log ratio of gradients along an outline (`tracker.aerial.ghosts`) below which nothing is there, and above
 which a track begins."""
 ENOUGH = 5
@@ -103,14 +105,15 @@ class AerialTracker:
         sure = [_box(track.corners()) for track in self._tracks if track.went()]
         kept = np.array(sure).reshape(-1, 4)
         mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
-        self._shadows.learn(self._background, mask)
-        blobs = find_blobs(self._shadows.take_off(mask), LEAST_AREA // 2)
+        blobs = find_blobs(self._shadows.take_off(self._background, mask), LEAST_AREA // 2)
         origin = self._background.origin + np.array(self._background.view[:2])
         places = np.array([track.state[:, 0] for track in self._tracks]).reshape(-1, 2) - origin
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
         sizes = np.array([track.size for track in self._tracks]).reshape(-1, 2)
         senior = np.array([track.confirmed for track in self._tracks], np.bool_)
-        own, beaten, left = outline(blobs.labels, self._single(blobs), senior, places, headings, sizes)
+        own, beaten, left = outline(
+            blobs.labels, self._single(blobs, places), senior, places, headings, sizes
+        )
         rest = find_blobs(left > 0, LEAST_AREA)
         sharper = contrast(rest, self._background)
         self._background.adopt(np.append(False, sharper < GHOST)[rest.labels])
@@ -152,12 +155,19 @@ class AerialTracker:
         """Return (2,) the length and width, px, of the largest vehicle, a lorry, as far as that is known."""
         return HUGE * self._usual if self._usual.any() else np.full(2, np.inf)
 
-    def _single(self, blobs: Blobs) -> NDArray[np.bool_]:
-        """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of the known."""
+    def _single(self, blobs: Blobs, places: Floats) -> NDArray[np.bool_]:
+        """Tell which labels (R + 1,) can be one vehicle at most, by the usual size of those below the known.
+
+        Of the known at ``places`` (N, 2) themselves the sizes would tell less: two may be parts of one.
+        """
         sizes = free_outlines(blobs.labels, len(blobs)).sizes
-        known = np.array([track.size for track in self._tracks if track.confirmed and track.whole])
-        if len(known) > ENOUGH:
-            self._usual = np.median(known, axis=0)
+        known = np.array([track.confirmed and track.whole for track in self._tracks], np.bool_)
+        height, width = blobs.labels.shape
+        columns, rows = np.clip(places[known].astype(int), 0, [width - 1, height - 1]).T
+        below = blobs.labels[rows, columns]
+        below = below[below > 0]
+        if len(below) > ENOUGH:
+            self._usual = np.median(sizes[below - 1], axis=0)
         usual = self._usual if self._usual.any() or not len(sizes) else np.median(sizes, axis=0)
         return np.append(False, (sizes <= usual * LARGEST).all(1))
 
@@ -213,13 +223,19 @@ class AerialTracker:
             and track.whole
             and track.hits >= tracks.CONFIRMING_HITS
             and track.pictures
-            and track.went(MOVED * max(1.0, self._usual[0] / track.size[0]))
+            and (self._moved(track) or (track.hits >= SLOW and track.went(BUDGED)))
         ]
-        for old, track in self._hidden.reacquire(new, to_mosaic):
+        known = self._hidden.reacquire(new, to_mosaic)
+        for old, track in known:
             self._join(old, track)
         for track in new:
-            track.confirmed = True
-            self._trajectories.append(track.id, self._tick, track.centre)
+            if self._moved(track) or any(track is other for _, other in known):
+                track.confirmed = True
+                self._trajectories.append(track.id, self._tick, track.centre)
+
+    def _moved(self, track: Track) -> bool:
+        """Tell whether a new track has gone so far that it must be a vehicle."""
+        return track.went(MOVED * max(1.0, self._usual[0] / track.size[0]))
 
     def _join(self, old: Track, track: Track) -> None:
         """Let a new track go on as an old one; the way between them is learnt."""

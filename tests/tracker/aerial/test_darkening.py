@@ -26,6 +26,23 @@ def test_shadows_are_taken_out_and_dark_paint_is_not():
     assert all(np.array_equal(a, b) for a, b in zip(before, (image, background, mask), strict=True))
 
 
+def test_of_two_darknesses_the_one_to_one_side_is_the_shadows():
+    # Paints as smooth as shadows, and more of them, but of many darknesses.
+    rng = np.random.default_rng(2)
+    background = np.full((240, 200, 3), 120, np.uint8)
+    image, mask, shadow = background.copy(), np.zeros((240, 200), bool), np.zeros((240, 200), bool)
+    paints = (0.4, 0.4, 0.4, 0.5, 0.85, 0.9, 1.3, 1.6)
+    for k, (y, x) in enumerate((y, x) for y in range(10, 230, 28) for x in (10, 60, 110, 160)):
+        image[y : y + 10, x : x + 24] = round(120 * paints[k % len(paints)])
+        image[y + 10 : y + 17, x : x + 24] = 82
+        mask[y : y + 17, x : x + 24] = shadow[y + 10 : y + 17, x : x + 24] = True
+    image = np.clip(image + rng.normal(0, 1.5, image.shape), 0, 255).astype(np.uint8)
+    left = Shadows().remove(image, background, mask)
+    assert left[shadow].mean() < 0.1
+    dark = mask & ~shadow & (image.mean(2) < 66)
+    assert left[dark].mean() > 0.9
+
+
 @given(seed=st.integers(0, 10_000))
 @settings(max_examples=15, deadline=None)
 def test_darkness_is_its_plain_twin(seed):

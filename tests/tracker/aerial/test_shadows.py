@@ -9,18 +9,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracker.aerial.background import Background
-from tracker.aerial.shadows import EVERY, CastShadows
+from tracker.aerial.shadows import EVERY, CastShadows, along, filled
 
 NONE = np.zeros((0, 4))
 
 
+ROAD = np.array([110, 112, 114], np.uint8)
+SHADE = (0.55 * ROAD).astype(np.uint8)
+
+
 @given(st.integers(-5, 5), st.integers(-5, 5), st.integers(0, 1000))
 @settings(max_examples=30, deadline=None)
-def test_what_is_left_is_vehicle_all_along_the_offset(right, down, seed):
+def test_along_an_offset_is_everywhere_on_the_way(right, down, seed):
     mask = cv2.medianBlur((np.random.default_rng(seed).random((40, 50)) < 0.7).astype(np.uint8), 5) > 0
-    shadows = CastShadows()
-    shadows.offset = np.array([right, down], float)
-    left = shadows.take_off(mask)
+    left = along(mask, np.array([right, down], float))
     steps = max(abs(right), abs(down))
     for i, j in np.ndindex(mask.shape):
         expected = True
@@ -35,24 +37,72 @@ def test_a_rectangle_is_found_again_without_its_shadow():
     for share in np.linspace(0, 1, 5):
         y, x = round(20 + 4 * share), round(30 + 3 * share)
         mask[y : y + 10, x : x + 20] = True
-    shadows = CastShadows()
-    shadows.offset = np.array([3.0, 4.0])
-    left = shadows.take_off(mask)
+    left = along(mask, np.array([3.0, 4.0]))
     assert left[20:30, 30:50].all()
     assert left.sum() <= 10 * 20 + 12
 
 
-def test_the_offset_is_learnt_from_bright_vehicles():
-    ground = np.full((120, 160, 3), (110, 112, 114), np.uint8)
+@given(st.integers(0, 1000))
+@settings(max_examples=30, deadline=None)
+def test_what_is_filled_lies_between_two_pixels_of_its_region(seed):
+    mask = cv2.medianBlur((np.random.default_rng(seed).random((30, 36)) < 0.6).astype(np.uint8), 5) > 0
+    whole = filled(mask)
+    assert (whole >= mask).all()
+    _, labels = cv2.connectedComponents(mask.astype(np.uint8))
+    hulls = [
+        cv2.convexHull(cv2.findNonZero((labels == k).astype(np.uint8))) for k in range(1, labels.max() + 1)
+    ]
+    for y, x in np.argwhere(whole & ~mask):
+        point = (float(x), float(y))
+        # A hull that is drawn on pixels reaches up to half of one beyond its line.
+        assert max(cv2.pointPolygonTest(hull, point, True) for hull in hulls) >= -0.75
+
+
+def test_a_vehicle_of_the_roads_colour_is_filled_and_two_that_touch_are_not():
+    mask = np.zeros((60, 120), bool)
+    mask[20:34, 10:34] = True
+    mask[20:28, 14:30] = False
+    mask[20, 14:30] = True
+    mask[5:15, 60:80] = mask[14:50, 79:82] = mask[40:50, 60:80] = True
+    whole = filled(mask)
+    assert whole[20:34, 10:34].all()
+    assert not whole[25:35, 62:75].any()
+
+
+def _drive(frames, draw):
+    """Let shadows be learnt from vehicles that are drawn on a plain road; return them and what is left."""
+    ground = np.tile(ROAD, (120, 160, 1))
     background, shadows = Background(), CastShadows()
     for _ in range(12):
         background.apply(ground, np.eye(3), NONE)
-    for k in range(20 * EVERY):
+    for k in range(frames):
         seen = ground.copy()
-        x = 10 + k % 100
-        seen[44:54, x + 0 : x + 24] = (ground[0, 0] * 0.55).astype(np.uint8)
-        seen[40:50, x : x + 24] = (235, 230, 228)
-        mask = background.apply(seen, np.eye(3), NONE)
-        shadows.learn(background, mask)
-    assert shadows.offset == pytest.approx([0.0, 4.0], abs=1.3)
-    assert shadows.offset[1] > 2.0
+        draw(seen, 10 + k % 100)
+        left = shadows.take_off(background, background.apply(seen, np.eye(3), NONE))
+    return shadows, left
+
+
+def _with_shadow(seen, x, y, colour, fall=4):
+    seen[y + fall : y + fall + 10, x : x + 24] = SHADE
+    seen[y : y + 10, x : x + 24] = colour
+
+
+@pytest.mark.parametrize("colour", [(235, 230, 228), (30, 30, 31), (160, 40, 30)])
+def test_the_offset_is_learnt_from_vehicles_of_any_colour(colour):
+    shadows, left = _drive(20 * EVERY, lambda seen, x: _with_shadow(seen, x, 40, colour))
+    assert shadows.offset == pytest.approx([0.0, 4.0], abs=1.0)
+    rows, columns = np.nonzero(left)
+    assert (rows.min(), rows.max()) == pytest.approx((40, 49), abs=1)
+    assert np.ptp(columns) == pytest.approx(23, abs=2)
+
+
+def test_vehicles_that_a_shadow_joins_fall_apart():
+    def draw(seen, x):
+        _with_shadow(seen, x, 20, (235, 230, 228))
+        if x > 70:
+            _with_shadow(seen, x, 60, (235, 230, 228), fall=12)
+            _with_shadow(seen, x, 76, (160, 40, 30))
+
+    _, left = _drive(20 * EVERY, draw)
+    count, _ = cv2.connectedComponents(left.astype(np.uint8))
+    assert count - 1 == 3
