@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.motorcycle_lane.change import carry, corner, differences, keep
+from tracker.motorcycle_lane.change import carry, corner, differences, keep, unhide
 from tracker.motorcycle_lane.features import Features, extract
 from tracker.motorcycle_lane.tables import (
     COLOUR,
@@ -78,13 +78,15 @@ class BackgroundParameters:
             changed. Raising it withstands larger objects, and misses a sun that only shines on a part.
         flash_frames: Successive frames of such a share before all is learnt anew.
         follow_light: Whether the background image behind foreground follows the light of the rest, so it
-            fits when it is seen again.
+            fits when it is seen again; also when all is learnt anew.
         uncovered: Whether a pixel that moved and now equals the background image is background, whatever its
             pair of colours. As printed the pair decides, and the strip that an object has just uncovered is
             foreground.
         rims: Whether what is changed beside foreground is learnt as foreground, too, though it looks like
             background. As printed, every pixel of an object that does is written into the background image
             and into the tables as background, and the next object is the less seen there.
+        revise: Whether, as long as all frames weigh the same, what a pixel shows most often becomes its
+            background, though the training saw another.
     """
 
     mode: StatMode = StatMode.CONDITIONAL
@@ -102,7 +104,7 @@ class BackgroundParameters:
     least_change: int = 12
     most_change: int = 30
     flash_share: float = 0.25
-    flash_frames: int = 3
+    flash_frames: int = 1
     follow_light: bool = True
     uncovered: bool = True
     rims: bool = True
@@ -121,6 +123,7 @@ PAPER = BackgroundParameters(
     colour_floor=0.0,
     least_change=10,
     flash_share=0.5,
+    flash_frames=3,
     follow_light=False,
     uncovered=False,
     rims=False,
@@ -157,7 +160,8 @@ class BackgroundModel:
         self._earlier = np.float32(0.0)
         self._frames = 0
         self._flashing = 0
-        # Share of foreground in the last frame that was no flash.
+        # Foreground of the last frame that was no flash, and its share.
+        self._foreground = np.zeros(pixels, np.bool_)
         self._calm = 0.0
 
     @property
@@ -194,32 +198,29 @@ class BackgroundModel:
             raise ValueError(f"image is {image.shape}, wanted {(*self._shape, 3)}")
         p = self.parameters
         image = np.ascontiguousarray(image)
-        pixels = image.reshape(-1, 3)
         if self._frames == 0:
-            self._previous = pixels
-        features = extract(image, self._previous.reshape(image.shape))
-        if self._frames == 0:
-            self._begin(pixels, features)
-            mask = np.zeros(len(pixels), np.bool_)
+            self._begin(image)
+            mask = np.zeros(len(self._p_b), np.bool_)
         else:
             if self._frames == p.start_frames // 2:
                 self._begin_background()
             if self._frames == p.start_frames:
                 self._settle()
-            mask = self._step(pixels, features)
-            share = float(mask.mean())
-            flash = share > self._calm + p.flash_share and not self.training
+            mask = self._step(image)
+            flash = mask.mean() > self._calm + p.flash_share and not self.training
             self._flashing = self._flashing + 1 if flash else 0
-            self._calm = self._calm if flash else share
-        self._previous = pixels.copy()
+            if self._flashing == p.flash_frames:
+                mask = self._begin_again(image, mask)
+            if self._flashing == 0:
+                self._foreground, self._calm = mask, float(mask.mean())
+        self._previous = image.reshape(-1, 3).copy()
         self._frames += 1
-        if self._flashing == p.flash_frames:
-            self._frames = self._flashing = 0
         return mask.reshape(self._shape)
 
-    def _step(self, pixels: NDArray[np.uint8], features: Features) -> NDArray[np.bool_]:
+    def _step(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """Classify a frame, then learn from it; returns the foreground (P,)."""
         p, one = self.parameters, np.float32(1.0)
+        pixels, features = image.reshape(-1, 3), extract(image, self._previous.reshape(image.shape))
         far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
         is_far = far > corner(far_counts, p.least_change, p.most_change)
         is_moved = moved > corner(moved_counts, p.least_change, p.most_change)
@@ -322,16 +323,34 @@ class BackgroundModel:
         """Return the common factor of p(v|b) of some pixels."""
         return self._factor_shared[at] if self._conditional else np.full(len(at), self._factor)
 
-    def _begin(self, pixels: NDArray[np.uint8], features: Features) -> None:
+    def _begin(self, image: NDArray[np.uint8]) -> None:
         """Take a frame for background, the only thing that each pixel has ever shown."""
-        for table, feature in zip(self._tables, features, strict=True):
+        for table, feature in zip(self._tables, extract(image, image), strict=True):
             table.seen[: table.used] = 0.0
             table.features[0] = feature
             table.seen[0] = table.shared[0] = 1.0
-        self._background[:] = pixels
+        self._background[:] = image.reshape(-1, 3)
         self._p_b[:] = 1.0
         self._factor, self._earlier = np.float32(1.0), np.float32(0.0)
         self._conditional = False
+
+    def _begin_again(self, image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Learn all anew after the light has changed at once; returns the foreground (P,).
+
+        As printed the next frame is the first of a training. But what hides the background now did so before,
+        so that the background is known, and needs none.
+        """
+        self._flashing = 0
+        if not self.parameters.follow_light:
+            self._frames = -1
+            return mask
+        shown = unhide(image, self.background, self._foreground.reshape(self._shape))
+        self._begin(shown)
+        self._previous = shown.reshape(-1, 3)
+        self._conditional = self.parameters.mode is StatMode.CONDITIONAL
+        self._factor_shared[:] = 1.0
+        self._frames = self.parameters.start_frames
+        return self._step(image)
 
     def _begin_background(self) -> None:
         """Forget what went for background so far: only now is it known what each pixel shows most often."""

@@ -7,11 +7,17 @@ where their peak ends and the tail of changed ones begins.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 Bytes = NDArray[np.uint8]
+
+ROUND = 4
+"""What hides the background has gone no farther than so many pixels since it was last told."""
+NEARBY = 30
+"""Half side of the window that tells how the light has changed at a pixel, px."""
 
 
 @njit(cache=True)
@@ -108,3 +114,27 @@ def carry(background, foreground, light):  # type: ignore[no-untyped-def]
         if foreground[i]:
             for c in range(3):
                 background[i, c] = min(background[i, c] * light[c], np.float32(255.0))
+
+
+def unhide(image: Bytes, background: Bytes, hidden: NDArray[np.bool_]) -> Bytes:
+    """Return a picture without what hides its background, after the light has changed at once.
+
+    What was known of the background stands there, in the light that has come to what is seen nearby: the
+    mean of the picture over that of the known background.
+
+    Args:
+        image: (H, W, 3) RGB, in the new light.
+        background: (H, W, 3) RGB, in the old light.
+        hidden: (H, W) where the background was hidden.
+    """
+    if not hidden.any():
+        return image
+    wide = cv2.dilate(hidden.astype(np.uint8), np.ones((2 * ROUND + 1, 2 * ROUND + 1), np.uint8))
+    seen = (wide == 0)[..., None]
+    window = (2 * NEARBY + 1, 2 * NEARBY + 1)
+    now, then = (
+        cv2.boxFilter(picture * seen, cv2.CV_64F, window, normalize=False, borderType=cv2.BORDER_CONSTANT)
+        for picture in (image, background)
+    )
+    expected = np.round(background * ((now + 1.0) / (then + 1.0)))
+    return np.where(seen, image, np.minimum(expected, 255.0).astype(np.uint8))

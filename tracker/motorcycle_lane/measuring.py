@@ -18,6 +18,7 @@ from tracker.motorcycle_lane import colour, silhouettes
 from tracker.motorcycle_lane.front_end import Sight
 from tracker.motorcycle_lane.silhouettes import Silhouette
 from tracker.motorcycle_lane.sizes import SizeModel
+from tracker.motorcycle_lane.travellers import Travellers
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -195,6 +196,7 @@ class Measurer:
     def __init__(self, width: int, height: int) -> None:
         self.sizes = SizeModel(width, height)
         self.silhouette = Silhouette()
+        self._travellers = Travellers()
         self._frame = np.array([width, height], float)
         self._frames = 0
 
@@ -225,11 +227,11 @@ class Measurer:
         joined = np.zeros(len(expected.centres), np.bool_)
         alone: list[int] = []
         apart: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
-        samples: list[int] = []
+        moved: list[int] = []
         for tracks, regions in groups:
             b = int(regions[0])
             if expected.moved[tracks].any():
-                samples.extend(regions[~at_border[regions]].tolist())
+                moved.extend(regions[~at_border[regions]].tolist())
             small = blobs.areas[b] < TOO_SMALL * usual[b].prod()
             if len(tracks) == 0 and known[b] and small and not at_border[b]:
                 continue
@@ -266,8 +268,9 @@ class Measurer:
             x0, y0 = blobs.boxes[regions, :2].min(0)
             x1, y1 = blobs.boxes[regions, 2:].max(0)
             found.append(self._explain(owner, number + 1, bins, (x0, y0, x1, y1), expected, tracks, joined))
+        travelled = self._travellers.step(blobs, cores, ~at_border)
         if self._frames >= TRAINING:
-            self._learn(blobs.labels, cores, np.array(samples, np.int64), chosen)
+            self._learn(blobs.labels, cores, travelled, np.array(moved, np.int64), chosen)
         self._frames += 1
         return _together(found, joined)
 
@@ -330,14 +333,18 @@ class Measurer:
         self,
         labels: NDArray[np.int32],
         cores: Floats,
-        samples: NDArray[np.int64],
+        travelled: NDArray[np.int64],
+        expected: NDArray[np.int64],
         alone: NDArray[np.int64],
     ) -> None:
+        """Learn from regions that travelled, and from those where riders are expected."""
+        samples = np.union1d(travelled, expected)
         if not len(samples):
             return
         boxes = cores[samples]
-        self.sizes.learn(0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 2:] - boxes[:, :2] + 2.0 * EATEN)
-        for b in np.intersect1d(samples, alone):
+        rows, sizes = 0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 2:] - boxes[:, :2] + 2.0 * EATEN
+        self.sizes.learn(rows, sizes, np.isin(samples, travelled))
+        for b in np.intersect1d(expected, alone):
             x0, y0, x1, y1 = cores[b].astype(int)
             self.silhouette.learn(labels[y0:y1, x0:x1] == b + 1)
 

@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 CAPACITY = 600
-"""Samples that are kept: the newest."""
-ENOUGH = 30
+"""Samples of either kind that are kept: the newest."""
+ENOUGH, ENOUGH_TRAVELLED = 30, 100
+"""Samples of both kinds from which on there is a line; those of regions that travelled, from which on they
+alone tell it."""
 BEYOND = 0.4
 """How far beyond the rows that were sampled the line holds, as a share of the picture's height."""
 TOLERANCE = 0.25
@@ -41,6 +43,7 @@ class SizeModel:
 
     def __init__(self, width: int, height: int) -> None:
         self._rows, self._sizes = np.zeros(0), np.zeros((0, 2))
+        self._travelled = np.zeros(0, np.bool_)
         self._scale = float(height)
         self._fresh = 0
         self._limits = np.array([np.inf, -np.inf])
@@ -69,21 +72,31 @@ class SizeModel:
         top, bottom = self.sizes(np.array([0.0, self._scale]))
         return top, (bottom - top) / self._scale
 
-    def learn(self, rows: Floats, sizes: Floats) -> None:
-        """Take in the regions of a frame that moved.
+    def learn(self, rows: Floats, sizes: Floats, travelled: NDArray[np.bool_]) -> None:
+        """Take in regions of a frame.
 
         Args:
             rows: (K,) of their centres, px.
             sizes: (K, 2) their widths and heights, px.
+            travelled: (K,) whether a region was seen to travel (`tracker.motorcycle_lane.travellers`); the
+                others are where a rider is expected that has gone some way. Those are many from the start,
+                but who is expected depends on the sizes.
         """
-        self._rows = np.concatenate([self._rows, rows])[-CAPACITY:]
-        self._sizes = np.concatenate([self._sizes, sizes])[-CAPACITY:]
-        self._fresh += len(rows)
-        if len(self._rows) >= ENOUGH and self._fresh >= len(self._rows) // 8:
+        rows, travelled = np.concatenate([self._rows, rows]), np.concatenate([self._travelled, travelled])
+        kept = np.zeros(len(rows), np.bool_)
+        for kind in (travelled, ~travelled):
+            kept[np.flatnonzero(kind)[-CAPACITY:]] = True
+        self._sizes = np.concatenate([self._sizes, sizes])[kept]
+        self._rows, self._travelled = rows[kept], travelled[kept]
+        told = self._travelled
+        if told.sum() < ENOUGH_TRAVELLED:
+            told = np.ones(len(told), np.bool_)
+        self._fresh += len(sizes)
+        if told.sum() >= ENOUGH and self._fresh >= told.sum() // 8:
             self._fresh = 0
-            self._lines = robust_lines(self._rows / self._scale, self._sizes)
+            self._lines = robust_lines(self._rows[told] / self._scale, self._sizes[told])
             beyond = BEYOND * self._scale * np.array([-1.0, 1.0])
-            self._limits = np.quantile(self._rows, [0.02, 0.98]) + beyond
+            self._limits = np.quantile(self._rows[told], [0.02, 0.98]) + beyond
 
 
 def robust_lines(places: Floats, sizes: Floats, rounds: int = 5) -> Floats:

@@ -65,7 +65,7 @@ class MotorcycleLaneTracker(EpisodeTracker):
             tracks.ids[gone], tracks.centres[gone], tracks.velocities[gone], tracks.sizes[gone, 1]
         )
         self._diagnostics = Diagnostics(
-            detections=self._clip(seen.boxes),
+            detections=self._clip(seen.boxes[store.believed]),
             mask=sight.mask,
             background=self._background.background,
             association=association,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tracker.boxes import box_area, intersection, iou
 from tracker.filtering import coalescence, jpda, planar
 from tracker.motorcycle_lane import colour
+from tracker.motorcycle_lane.clutter import ClutterMap
 from tracker.motorcycle_lane.measuring import Expected, Measurements
 from tracker.motorcycle_lane.sizes import SizeModel
 from tracker.types import Status
@@ -56,14 +57,14 @@ CONFIRMED, CONFIRMING_HITS = 0.9, 3
 MOVED, ENTERED = 0.4, 0.12
 """Rider heights that a track must have gone to be confirmed: leaves sway, and lights flicker, in place. Less
 is asked of one that began at the border, where riders come from."""
-TRAINING, EARLY = 30, 1.0
-"""Frames in which leaves that sway still are foreground, and what a track that began in them must go."""
 IN_FRAME, ENOUGH_IN_FRAME = 0.15, 0.3
 """Share of its box in the picture below which a track ends, and below which it is only presumed."""
 SIZE_RATE, COLOUR_RATE = 0.1, 0.1
 USUAL_RATE = 0.01
 """How fast a rider's size becomes the usual one of its row while it is not measured."""
 COASTING_MISSES = 3
+LONG_TENTATIVE = 15
+"""Frames in which a track was measured after which it should have been confirmed, were it a rider."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -159,15 +160,17 @@ class TrackStore:
     Attributes:
         tracks: Those of now.
         beta: (N, M + 1) association probabilities of the last frame, of the tracks that it began with.
+        believed: (M,) which of its measurements are riders: a confirmed track's, or where others were.
     """
 
     def __init__(self, width: int, height: int, rate: float) -> None:
         self.tracks = TrackArrays.none()
         self.beta: Floats = np.zeros((0, 1))
+        self.believed = np.zeros(0, np.bool_)
+        self._clutter = ClutterMap(width, height)
         self._frame = np.array([[0.0, 0.0, width, height]])
         self._step = 1.0 / rate
         self._next = 1
-        self._frames = 0
         # Colours of riders that are not in the picture any more.
         self._others: Floats = np.full((1, colour.REGIONS, colour.BINS), 1.0 / colour.BINS)
 
@@ -222,12 +225,14 @@ class TrackStore:
             joined: (N,) whether a track's region had to be explained by silhouettes.
         """
         t = self.tracks
-        self._frames += 1
         free = np.ones(len(seen))
+        clutter = self._clutter.share(seen.centres)
+        self.believed = clutter < 0.5
         if len(t):
             free = self._associate(seen, joined)
+            self.believed |= self.beta[t.confirmed, 1:].sum(0) > 0.5
         self._end()
-        self._begin(seen, free)
+        self._begin(seen, free, 1.0 - clutter)
 
     def _associate(self, seen: Measurements, joined: NDArray[np.bool_]) -> Floats:
         """Associate and update; returns (M,) the probability that a measurement is no track's."""
@@ -285,12 +290,23 @@ class TrackStore:
         # Of two at one place the one that was measured more often is right.
         doubtful = ~t.confirmed | (t.misses > COASTING_MISSES)
         better = t.hits[None, :] > t.hits[:, None]
+        self._learn_places(ended)
         ended |= doubtful & ((iou(boxes, boxes) > SAME) & better).any(1)
         left = t.references[ended & t.confirmed]
         self._others = np.concatenate([self._others, left])[-32:]
         t.keep(~ended)
 
-    def _begin(self, seen: Measurements, free: Floats) -> None:
+    def _learn_places(self, ended: NDArray[np.bool_]) -> None:
+        """Learn where riders are, and where what ends unconfirmed, or should long have been, was seen."""
+        t, hit = self.tracks, self.tracks.misses == 0
+        self._clutter.add_riders(t.centres[t.confirmed & hit & t.moved(1.0)])
+        late = ~t.confirmed & hit & (t.hits > LONG_TENTATIVE)
+        self._clutter.add_nothing(t.centres[late], np.ones(int(late.sum())))
+        never = ended & ~t.confirmed
+        self._clutter.add_nothing(t.centres[never], np.minimum(t.hits[never], LONG_TENTATIVE).astype(float))
+
+    def _begin(self, seen: Measurements, free: Floats, trust: Floats) -> None:
+        """Begin tracks of measurements that are free, ``trust`` (M,) in them being 1 less their clutter."""
         at = np.flatnonzero(free > 0.5)
         if not len(at):
             return
@@ -310,14 +326,14 @@ class TrackStore:
                 covariance=covariance,
                 sizes=sizes,
                 references=seen.histograms[at],
-                existence=np.where(border, BORDER_BIRTH, BIRTH) * free[at],
+                existence=np.where(border, BORDER_BIRTH, BIRTH) * free[at] * trust[at],
                 hits=np.ones(count, np.int64),
                 misses=np.zeros(count, np.int64),
                 confirmed=np.zeros(count, np.bool_),
                 sized=seen.sized[at].astype(np.int64),
                 stood=np.zeros(count, np.int64),
                 origins=seen.centres[at],
-                asked=np.full(count, EARLY) if self._frames <= TRAINING else np.where(border, ENTERED, MOVED),
+                asked=np.where(border, ENTERED, MOVED),
             )
         )
         self._next += count

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tracker.motorcycle_lane.twin import PlainModel, plain_corner
+from tests.tracker.motorcycle_lane.twin import PlainModel, plain_corner, unhidden
 from tracker.motorcycle_lane.background import PAPER, BackgroundModel, BackgroundParameters, StatMode
-from tracker.motorcycle_lane.change import corner
+from tracker.motorcycle_lane.change import corner, unhide
 from tracker.motorcycle_lane.tables import COLOUR, GRADIENT, PAIR, Table, all_same, evidence, learn, same
 
 MODES = list(StatMode)
@@ -83,6 +83,40 @@ def test_corner_separates_noise_from_change():
         assert 2 * sigma < threshold < 6 * sigma
     # All has changed: the peak lies where no noise can be, and nothing of it passes for noise.
     assert corner(np.bincount(np.full(1000, 80), minlength=256), 10, 30) == 30
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=20, deadline=None)
+def test_hidden_background_is_shown_in_the_light_of_what_is_nearby(seed):
+    rng = np.random.default_rng(seed)
+    background = rng.integers(20, 200, (40, 90, 3), dtype=np.uint8)
+    light = np.where(np.arange(90) < 45, 0.6, 1.25)[:, None]
+    image = np.clip(background * light, 0, 255).astype(np.uint8)
+    hidden = rng.random((40, 90)) < 0.002
+    image[hidden] = rng.integers(0, 256, 3)
+    found = unhide(image, background, hidden)
+    assert np.array_equal(found, unhidden(image, background, hidden))
+    # At either end no window reaches the other light.
+    ends = found[:, [0, -1]] / (background * light)[:, [0, -1]]
+    assert np.abs(np.median(ends, (0, 2)) - 1.0).max() < 0.05
+
+
+def test_who_is_there_when_the_light_changes_leaves_no_ghost():
+    """A square rides on through a flash; neither where it stood nor the rest is foreground afterwards."""
+    rng = np.random.default_rng(0)
+    road = rng.integers(60, 140, (60, 100, 3))
+    model = BackgroundModel(100, 60)
+    for k in range(90):
+        picture = road * (1.0 if k < 70 else 1.5)
+        place = slice(20, 36), slice(10 + k // 2, 18 + k // 2)
+        if k >= 31:
+            picture[place] = (220, 30, 40)
+        mask = model.apply((picture + rng.normal(0, 2.0, picture.shape)).clip(0, 255).astype(np.uint8))
+        if k >= 73:
+            rider = np.zeros(mask.shape, bool)
+            rider[place] = True
+            assert mask[rider].mean() > 0.9
+            assert mask[~rider].mean() < 0.01
 
 
 def pack(kind, values):
@@ -237,7 +271,7 @@ def test_traffic_that_the_training_took_for_background_goes_once_the_road_was_se
 
 
 @pytest.mark.parametrize("gain", [0.5, 1.5])
-def test_change_of_the_whole_light_is_learnt_within_a_second(gain):
+def test_change_of_the_whole_light_is_learnt_at_once(gain):
     rng = np.random.default_rng(2)
     base = rng.integers(40, 160, (12, 16, 3))
     model = BackgroundModel(16, 12)
@@ -246,8 +280,7 @@ def test_change_of_the_whole_light_is_learnt_within_a_second(gain):
         picture = base * (gain if t >= 80 else 1.0) + rng.normal(0, 2, base.shape)
         shares.append(model.apply(np.clip(picture, 0, 255).astype(np.uint8)).mean())
     assert max(shares[40:80]) < 0.02
-    assert shares[80] > 0.9
-    assert max(shares[80 + 15 :]) < 0.02
+    assert max(shares[80:]) < 0.02
 
 
 def test_background_behind_foreground_follows_the_light():

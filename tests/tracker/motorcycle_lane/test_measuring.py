@@ -35,7 +35,7 @@ def test_sizes_are_known_only_about_rows_that_were_seen():
     model = SizeModel(360, 240)
     assert not model.known(np.array([100.0])).any()
     rows = np.linspace(60, 120, 40)
-    model.learn(rows, np.stack([0.2 * rows, 0.4 * rows], 1))
+    model.learn(rows, np.stack([0.2 * rows, 0.4 * rows], 1), np.zeros(40, bool))
     assert model.known(np.array([-60.0, 20.0, 90.0, 200.0, 230.0])).tolist() == [
         False,
         True,
@@ -44,6 +44,21 @@ def test_sizes_are_known_only_about_rows_that_were_seen():
         False,
     ]
     assert np.allclose(model.sizes(np.array([90.0])), [[18.0, 36.0]], rtol=0.02)
+
+
+def test_what_travelled_outvotes_what_was_expected():
+    """Tracks on pairs of riders, three times as many as what travelled, do not hold the sizes for ever."""
+    rng = np.random.default_rng(0)
+    model = SizeModel(360, 240)
+    for frame in range(160):
+        rows = rng.uniform(40.0, 200.0, 4)
+        single = np.arange(4) == 0
+        sizes = np.stack([0.2 * rows, 0.4 * rows], 1) * np.where(single, 1.0, 2.5)[:, None]
+        told = slice(0, 4) if frame >= 40 else slice(1, 4)
+        model.learn(rows[told], sizes[told] * rng.normal(1.0, 0.05, (4, 2))[told], single[told])
+        if frame == 40:
+            assert np.allclose(model.sizes(np.array([120.0])), [[60.0, 120.0]], rtol=0.1)
+    assert np.allclose(model.sizes(np.array([120.0])), [[24.0, 48.0]], rtol=0.1)
 
 
 @given(seed=st.integers(0, 10_000))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import cv2
 import numpy as np
 
 from tracker.motorcycle_lane.background import StatMode
+from tracker.motorcycle_lane.change import NEARBY, ROUND
 
 
 class PlainTable:
@@ -86,6 +88,23 @@ def with_rims(mask, changed):
     return mask | (changed & np.array(near))
 
 
+def unhidden(image, background, hidden):
+    """The picture, and where it may hide the background that in the light of what is seen nearby."""
+    height, width = hidden.shape
+    found = image.copy()
+
+    def window(y, x, reach):
+        return slice(max(y - reach, 0), y + reach + 1), slice(max(x - reach, 0), x + reach + 1)
+
+    seen = [[not hidden[window(y, x, ROUND)].any() for x in range(width)] for y in range(height)]
+    seen = np.array(seen)
+    for y, x in np.argwhere(~seen):
+        near = window(y, x, NEARBY)
+        now, then = (picture[near][seen[near]].sum(0) for picture in (image, background))
+        found[y, x] = np.minimum(np.round(background[y, x] * ((now + 1.0) / (then + 1.0))), 255)
+    return found
+
+
 class PlainModel:
     """What `tracker.motorcycle_lane.background.BackgroundModel` is, slowly."""
 
@@ -107,24 +126,50 @@ class PlainModel:
         self.background = self.previous = None
         self.frames = self.flashing = 0
         self.calm = 0.0
+        self.foreground = np.zeros(self.shape, bool)
 
     def apply(self, image, grey):
         p = self.parameters
+        if self.frames == 0:
+            self.begin(image)
+            self.frames = 1
+            return np.zeros(self.shape, bool)
+        training = self.frames < p.start_frames
+        mask = self.step(image, grey)
+        flash = mask.mean() > self.calm + p.flash_share and not training
+        self.flashing = self.flashing + 1 if flash else 0
+        self.frames += 1
+        if self.flashing == p.flash_frames:
+            self.flashing = 0
+            if p.follow_light:
+                self.begin(unhidden(image, self.background.round().astype(np.uint8), self.foreground))
+                self.frames = p.start_frames
+                mask = self.step(image, grey)
+                self.frames += 1
+            else:
+                self.frames = 0
+        if not self.flashing:
+            self.foreground, self.calm = mask, mask.mean()
+        self.previous = image
+        return mask
+
+    def begin(self, image):
+        edges = sobel(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
+        self.background = image.astype(float)
+        self.previous = image
+        self.p_b[:] = 1
+        self.clear(lambda table: table.entries.clear())
+        self.earlier = 0.0
+        for at in np.ndindex(self.shape):
+            for table, feature in zip(
+                self.tables[at[0]][at[1]], self.features(image, edges, at), strict=True
+            ):
+                table.learn(feature, True, 1.0, self.parameters.mode)
+
+    def step(self, image, grey):
+        p = self.parameters
         edges = sobel(grey)
         mask = np.zeros(self.shape, bool)
-        if self.frames == 0:
-            self.background = image.astype(float)
-            self.previous = image
-            self.p_b[:] = 1
-            self.clear(lambda table: table.entries.clear())
-            self.earlier = 0.0
-            for at in np.ndindex(self.shape):
-                for table, feature in zip(
-                    self.tables[at[0]][at[1]], self.features(image, edges, at), strict=True
-                ):
-                    table.learn(feature, True, 1.0, p.mode)
-            self.frames = 1
-            return mask
         far = np.floor(np.abs(image - self.background).max(-1) + 0.5).astype(int)
         moved = np.abs(image.astype(int) - self.previous).max(-1)
         far, moved = (
@@ -159,14 +204,6 @@ class PlainModel:
         if p.revise and not training and self.frames * p.rate < 1:
             for at in np.argwhere(mask):
                 self.revise(tuple(at), image, self.features(image, edges, tuple(at)))
-        if mask.mean() > self.calm + p.flash_share and not training:
-            self.flashing += 1
-        else:
-            self.flashing, self.calm = 0, mask.mean()
-        self.frames += 1
-        self.previous = image
-        if self.flashing == p.flash_frames:
-            self.flashing = self.frames = 0
         return mask
 
     def revise(self, at, image, features):
