@@ -3,6 +3,24 @@
 Run with ``python -m tests.benchmarks.datasets [--seconds S] [--cluster ADDRESS]``; a cluster takes the place
 of the jobs. What starts the processes and populates the worlds is part of it: the longer the drives, the
 less it weighs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from scenarios import spec
+from scenarios.dataset import Dataset
+from scenarios.generate import generate
+from scenarios.workers import open_workers
+from tests.benchmarks.lines import Line, table
+
+SCENARIOS = ("in-car-day", "aerial-bridge", "lane-day")
+SEEDS = range(500, 504)
 """Four drives: as many for each of two jobs."""
 
 
