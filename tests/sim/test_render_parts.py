@@ -128,7 +128,7 @@ def test_every_lamp_that_is_on_is_found_body_by_body():
         shown = []
         if lamps & (Lamps.TAIL | Lamps.BRAKE):
             braking = bool(lamps & Lamps.BRAKE)
-            shown.append((Surface.TAIL_LAMP, [-cos, -sin, 0], 1.0, 6.0 if braking else 5.0))
+            shown.append((Surface.TAIL_LAMP, [-cos, -sin, 0], 1.0, 2.0 if braking else 1.0))
         if lamps & Lamps.HEAD:
             shown.append((Surface.HEAD_LAMP, [cos, sin, -0.05], 28.0, 14.0))
         for surface, aim, sharpness, reach in shown:
