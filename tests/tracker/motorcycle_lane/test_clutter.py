@@ -18,8 +18,11 @@ def test_share_counts_what_was_measured_in_a_place_and_beside_it(seed):
     counts = rng.integers(1, 9, 20).astype(float)
     places.add_riders(riders)
     places.add_nothing(nothing, counts)
-    cell = lambda place: np.clip(place, 0, (59, 44)) // CELL  # noqa: E731
-    near = lambda a, b: np.abs(cell(a) - cell(b)).max() <= 1  # noqa: E731
+
+    def near(place, other):
+        cells = np.clip([place, other], 0, (59, 44)) // CELL
+        return np.abs(cells[0] - cells[1]).max() <= 1
+
     for place, share in zip(asked, places.share(asked), strict=True):
         good = AT_FIRST + sum(near(place, rider) for rider in riders)
         bad = sum(n for at, n in zip(nothing, counts, strict=True) if near(place, at))
