@@ -66,7 +66,7 @@ class HiddenVehicles:
 
     def add(self, track: Track, trajectories: Trajectories) -> None:
         """Take in a track that is no longer seen."""
-        track.forecast = self._forecaster(trajectories, track.id)
+        track.forecast = self._forecaster(trajectories, track.path)
         self.tracks.append(track)
         self._unlikely[track.id], self._beliefs[track.id] = 0, Belief()
 

@@ -40,6 +40,8 @@ class ContextParameters:
         paced: Whether a predictor's clock runs as fast as the predictand went beside it.
         doubt: How many usual errors of a straight line the way of a single predictor must be off it to count;
             several count for more. 0 believes the predictors.
+        journey: Px from one end of a predictor's path to the other at least: what stands and shakes shows nobody
+            the way.
         search_every: Frames between two searches for more predictors.
     """
 
@@ -55,6 +57,7 @@ class ContextParameters:
     ridge: float = 400.0
     paced: bool = True
     doubt: float = 1.0
+    journey: float = 60.0
     search_every: int = 5
 
 
@@ -68,6 +71,7 @@ PRINTED = ContextParameters(
     ridge=0.0,
     paced=False,
     doubt=0.0,
+    journey=0.0,
     search_every=1,
 )
 """As printed, with alpha regularised: without that every exponent is infinite."""
@@ -83,6 +87,8 @@ ANCHOR = 9
 BACK = np.arange(1.0 - ANCHOR, 1.0)
 TO_END: Floats = 1.0 / ANCHOR + (BACK - BACK.mean()) * BACK.mean() / -((BACK - BACK.mean()) ** 2).sum()
 """Weights of points ``BACK`` frames ago in the last point of the line through them."""
+HEADING = 15
+"""Last points that tell where a vehicle goes."""
 ROOM = 10.0
 """Ticks of a predictor's known path from which on its clock may run at another pace."""
 DOUBT = 4.0
@@ -169,6 +175,7 @@ class ContextForecast:
             self._scatter = apart.T @ apart
             self._witnesses = len(self.guides)
         else:
+            self.velocity = self._onward()
             self._carried = before + self.velocity
         self._tick += 1
         self._section = np.concatenate([self._section[-self._parameters.window + 1 :], self._carried[None]])
@@ -177,6 +184,14 @@ class ContextForecast:
         self.point = self._believed()
         self._spread()
         self._drop_diverging()
+
+    def _onward(self) -> Floats:
+        """Return (2,) the velocity without predictors: where a vehicle goes is known from fewer points than
+        how fast, since a predictor's last ones lag behind where it went under something."""
+        if len(self._section) <= HEADING:
+            return self._straight
+        speed = float(np.hypot(*drift(self._section)[1]))
+        return speed * unit(drift(self._section[-HEADING:])[1])
 
     def _believed(self) -> Floats:
         """Lead what the predictors show back to the straight line, as far as drivers differ anyway.
@@ -270,6 +285,9 @@ class ContextForecast:
         """Make a predictor of the section that ends with a point ``end``; None if it goes another way."""
         first, last = self._trajectories.extent(track)
         begin = float(first + end)
+        gone = np.diff(self._trajectories.at(track, [first, last]), axis=0)[0]
+        if float(np.hypot(*gone)) < self._parameters.journey:
+            return None
         if not self._parameters.paced:
             return Guide(track, begin, 1.0, 1.0)
         window = self._parameters.window

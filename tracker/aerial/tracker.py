@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tracker.aerial import appearance, tracks
 from tracker.aerial.background import Background
-from tracker.aerial.forecasts import WINDOW, Forecaster
+from tracker.aerial.forecasts import WINDOW, Forecaster, drift, last_section, unit
 from tracker.aerial.ghosts import contrast
 from tracker.aerial.hidden import HiddenVehicles
 from tracker.aerial.measuring import free_outlines, outline
@@ -50,6 +50,9 @@ LARGEST = np.array([1.4, 1.5])
 """Length and width of a region, in usual ones, up to which it is one vehicle's."""
 HUGE = np.array([3.5, 2.2])
 """The same of the largest lorry: what is more is the light, or a bridge's edge, or many vehicles."""
+STRAIGHT = 0.99
+"""Cosine of the angle between the way of a vehicle before it was hidden and that from there to where it came
+back, above which the road between is straight."""
 LEAST_HISTORY = 20
 """Frames that a track must have been measured to be forecast once it vanishes."""
 GOES = 8.0
@@ -177,7 +180,7 @@ class AerialTracker:
         whole = [track for track in self._tracks if track.whole and track.misses == 0 and track.hits > 3]
         for track in whole:
             if track.confirmed:
-                self._trajectories.append(track.id, self._tick, track.centre)
+                self._trajectories.append(track.path, self._tick, track.centre)
             if track.hits % tracks.PICTURE_EVERY == 0 or len(track.pictures) < 2:
                 middle = transform(to_picture, track.centre)
                 turn = jacobian(to_picture, track.centre)
@@ -191,15 +194,15 @@ class AerialTracker:
             self._hidden.occluders.see(
                 np.array([track.centre for track in whole]), np.array([track.heading for track in whole])
             )
-        known = [track.id for track in whole if track.confirmed and self._goes(track.id)]
+        known = [track.path for track in whole if track.confirmed and self._goes(track.path)]
         self._hidden.rehearse(self._trajectories, self._tick, known)
 
-    def _goes(self, track: int) -> bool:
+    def _goes(self, path: int) -> bool:
         """Tell whether a track has a history long enough to be forecast, and moves."""
-        first, last = self._trajectories.extent(track)
+        first, last = self._trajectories.extent(path)
         if last < self._tick or last - first < WINDOW:
             return False
-        way = np.diff(self._trajectories.at(track, [last - WINDOW, last]), axis=0)[0]
+        way = np.diff(self._trajectories.at(path, [last - WINDOW, last]), axis=0)[0]
         return float(np.hypot(*way)) > GOES
 
     def _hide(self) -> None:
@@ -209,7 +212,7 @@ class AerialTracker:
                 track.misses >= tracks.MOST_MISSES
                 and track.confirmed
                 and track.hits >= LEAST_HISTORY
-                and track.id in self._trajectories
+                and track.path in self._trajectories
             ):
                 self._hidden.add(track, self._trajectories)
         self._tracks = [track for track in self._tracks if track.misses < tracks.MOST_MISSES]
@@ -231,7 +234,7 @@ class AerialTracker:
         for track in new:
             if self._moved(track) or any(track is other for _, other in known):
                 track.confirmed = True
-                self._trajectories.append(track.id, self._tick, track.centre)
+                self._trajectories.append(track.path, self._tick, track.centre)
 
     def _moved(self, track: Track) -> bool:
         """Tell whether a new track has gone so far that it must be a vehicle."""
@@ -241,9 +244,13 @@ class AerialTracker:
         """Let a new track go on as an old one; the way between them is learnt."""
         assert old.forecast is not None
         ticks = np.arange(old.since + 1, self._tick)
-        last = self._trajectories.at(old.id, [self._tick])[0]
+        last = self._trajectories.at(old.path, [self._tick])[0]
         share = np.linspace(0.0, 1.0, len(ticks) + 2)[1:-1, None]
         self._hidden.occluders.miss(last + share * (track.origin - last), track.origin - last)
+        before = drift(last_section(self._trajectories, old.path, WINDOW)[0])[1]
+        if unit(before) @ unit(track.origin - last) > STRAIGHT:
+            # Straight on between is where it went.
+            track.path = old.path
         track.id = old.id
         track.size = np.maximum(track.size, 0.9 * old.size)
         old.pictures.extend(track.pictures)

@@ -52,6 +52,8 @@ class Track:
 
     Attributes:
         id: >= 1.
+        path: Key in `Trajectories` of where it went since it came into view, for the first time or again: what
+            lies between is guessed, and shows nobody the way.
         state: (2, 2) x, vx; y, vy, px of the mosaic and px a frame.
         spread: (2, 2, 2) covariance of each axis.
         heading: (2,) unit vector.
@@ -67,6 +69,7 @@ class Track:
     """
 
     id: int
+    path: int
     state: Floats
     spread: Floats
     heading: Floats
@@ -109,6 +112,7 @@ def begin(number: int, outlines: Outlines, k: int, tick: int) -> Track:
     centre = outlines.centres[k]
     return Track(
         id=number,
+        path=number,
         state=np.column_stack([centre, np.zeros(2)]),
         spread=np.tile(np.diag([NOISE**2, SPEED**2]), (2, 1, 1)),
         heading=outlines.headings[k],
