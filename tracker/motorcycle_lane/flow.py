@@ -24,7 +24,7 @@ AGREED = 0.6
 SURE_SECONDS = 0.3
 """How much longer a track must have been seen against the others than with them."""
 WAY = 2.0
-"""Rider heights that it must have gone meanwhile, as it goes: a track that jumps to another rider goes less."""
+"""Rider heights that it must have gone meanwhile, as it goes: one that jumps to another rider goes less."""
 
 
 class Flow:

@@ -29,8 +29,8 @@ HORIZONS = (-1.0, -0.7, -0.5, -0.35, -0.25, -0.18, -0.12, -0.06, 0.0, 0.08, 0.16
 USUAL_HORIZON, HORIZON_SPREAD = -0.17, 0.2
 """Where the horizon of a camera that looks down on traffic lies, and its standard deviation."""
 USUAL_SLOPE, SLOPE_SPREAD = 0.3, 1.0
-"""Rows of a rider's height for each that it stands below the horizon: over a camera's height of six metres; and
-the standard deviation of its logarithm. Few samples of riders who hang together fit many lines."""
+"""Rows of a rider's height for each that it stands below the horizon: over a camera's of six metres; and the
+standard deviation of its logarithm. Few samples of riders who hang together fit many lines."""
 LEAST_BELOW = 0.05
 """How far below the horizon a sample must lie to tell of it."""
 VOTE = 0.08

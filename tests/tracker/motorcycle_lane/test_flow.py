@@ -10,7 +10,7 @@ HEIGHT, SPEED, RATE = 20.0, 60.0, 30.0
 
 
 def follow(turns):
-    """Two ride up the picture; a third does, too, but shows ``turns(k)`` for its row and velocity in frame k."""
+    """Two ride up the picture; a third does, too, its row and velocity in frame k being ``turns(k)``."""
     flow, flagged = Flow(360, 240, RATE), []
     for k in range(90):
         row = 230.0 - SPEED / RATE * k
