@@ -99,7 +99,7 @@ def clean(mask: NDArray[np.bool_], *, window: int = 3, largest_hole: int = 400) 
     left, top, right, bottom, area = found[:, :5].T
     inside = (left > 0) & (top > 0) & (right < mask.shape[1]) & (bottom < mask.shape[0])
     paint(filtered, runs, inside & (area <= largest_hole))
-    return filtered
+    return np.asarray(filtered)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
