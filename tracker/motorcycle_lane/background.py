@@ -31,6 +31,8 @@ from tracker.motorcycle_lane.tables import (
     turn,
 )
 
+ROUNDING = 0.01
+"""All p(v) of a pixel exceed 1 by less."""
 FADED = np.float32(1e-20)
 """A common factor that has fallen so far is taken into the tables."""
 
@@ -149,6 +151,7 @@ class BackgroundModel:
             Table.empty(p.pairs[1], pixels),
         )
         self._background = np.zeros((pixels, 3), np.float32)
+        self._picture: NDArray[np.uint8] | None = None  # the same in bytes, once it is asked for
         self._previous = np.zeros((pixels, 3), np.uint8)
         # p(b) of each pixel: one for all tables, since all learn from the same frames.
         self._p_b = np.zeros(pixels, np.float32)
@@ -158,8 +161,7 @@ class BackgroundModel:
         self._conditional = False
         # Weight of what came before p(v|b) and p(b) were last begun.
         self._earlier = np.float32(0.0)
-        self._frames = 0
-        self._flashing = 0
+        self._frames = self._flashing = 0
         # Foreground of the last frame that was no flash, and its share.
         self._foreground = np.zeros(pixels, np.bool_)
         self._calm = 0.0
@@ -167,7 +169,9 @@ class BackgroundModel:
     @property
     def background(self) -> NDArray[np.uint8]:
         """The background image, (H, W, 3) RGB."""
-        return np.asarray(self._background.round().astype(np.uint8).reshape(*self._shape, 3))
+        if self._picture is None:
+            self._picture = self._background.round().astype(np.uint8).reshape(*self._shape, 3)
+        return self._picture
 
     @property
     def training(self) -> bool:
@@ -219,6 +223,7 @@ class BackgroundModel:
 
     def _step(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """Classify a frame, then learn from it; returns the foreground (P,)."""
+        self._picture = None
         p, one = self.parameters, np.float32(1.0)
         pixels, features = image.reshape(-1, 3), extract(image, self._previous.reshape(image.shape))
         far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
@@ -280,6 +285,8 @@ class BackgroundModel:
         background[at] = 2.0 * vb * self._shared_factors(at) * self._p_b[at] > v * self._factor
         at = np.flatnonzero(changed & ~moved)
         c, cb = evidence(COLOUR, colours, features[0], at, p.colours[0], p.tolerance, p.colour_floor)
+        # A colour that never was background is none, whatever the gradient.
+        at, c, cb = (values[cb > 0.0] for values in (at, c, cb))
         e, eb = evidence(GRADIENT, gradients, features[1], at, p.gradients[0], p.tolerance, p.gradient_floor)
         shared = self._shared_factors(at)
         background[at] = 2.0 * cb * shared * eb * shared * self._p_b[at] > c * self._factor * e * self._factor
@@ -292,6 +299,9 @@ class BackgroundModel:
             at: Pixels that are foreground.
         """
         p = self.parameters
+        # All p(v) sum to 1 at most, and most pixels have seen too much background by one colour alone.
+        least = self._p_b[at] * self._tables[0].shared[0, at] * self._shared_factors(at)
+        at = at[least < 1.0 + ROUNDING - p.once_off]
         seen, shared = totals(self._tables[0], at, p.colours[0])
         foreign = seen * self._factor - self._p_b[at] * shared * self._shared_factors(at)
         at = at[foreign > p.once_off]
@@ -329,7 +339,7 @@ class BackgroundModel:
             table.seen[: table.used] = 0.0
             table.features[0] = feature
             table.seen[0] = table.shared[0] = 1.0
-        self._background[:] = image.reshape(-1, 3)
+        self._background[:], self._picture = image.reshape(-1, 3), None
         self._p_b[:] = 1.0
         self._factor, self._earlier = np.float32(1.0), np.float32(0.0)
         self._conditional = False

@@ -23,6 +23,8 @@ AGREED = 0.6
 """Length of the others' mean direction, 1 if all go the same way, from which it is one."""
 SURE_SECONDS = 0.3
 """How much longer a track must have been seen against the others than with them."""
+WAY = 2.0
+"""Rider heights that it must have gone meanwhile, as it goes: one that jumps to another rider goes less."""
 
 
 class Flow:
@@ -35,6 +37,8 @@ class Flow:
         self._ids = np.zeros(0, np.int64)
         self._places, self._directions = np.zeros((0, 2)), np.zeros((0, 2))
         self._against: dict[int, int] = {}
+        # Where each of those tracks was when it was first seen against the others.
+        self._since: dict[int, Floats] = {}
         self._frames = 0
 
     def step(
@@ -62,7 +66,15 @@ class Flow:
             self._places = np.concatenate([self._places, places[moving]])[-CAPACITY:]
             self._directions = np.concatenate([self._directions, directions[moving]])[-CAPACITY:]
         self._frames += 1
-        return np.array([i for i in ids.tolist() if self._against[i] >= self._limit], np.int64)
+        self._since = {
+            i: self._since.get(i, place)
+            for i, place in zip(ids.tolist(), places, strict=True)
+            if self._against[i] > 0
+        }
+        began = np.array([self._since.get(i, place) for i, place in zip(ids.tolist(), places, strict=True)])
+        way = ((places - began.reshape(-1, 2)) * directions).sum(1)
+        sure = np.array([self._against[i] >= self._limit for i in ids.tolist()], np.bool_)
+        return np.asarray(ids[sure & (way > WAY * heights)])
 
     def _verdict(self, ids: NDArray[np.int64], places: Floats, directions: Floats) -> NDArray[np.int64]:
         """Return (N,) 1 for a direction against the others', -1 for one with it, 0 where they say nothing."""

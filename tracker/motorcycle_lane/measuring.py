@@ -33,6 +33,8 @@ LEAST_WORTH = 0.45
 """How well a silhouette that no track expects must explain foreground."""
 LEAST_SEEN = 0.25
 """Smallest share of a silhouette that must be seen to measure where it is."""
+LEAST_OWN = 0.15
+"""Share of a silhouette that must be foreground which no other explains: less is no sign of a rider."""
 MOST_ADDED = 4
 CORE, FEET = 0.12, 0.3
 """Least share of a box that a row or column of a region's core fills; lowest share, where shadows lie."""
@@ -289,6 +291,12 @@ class Measurer:
         centres, sizes = expected.centres[tracks].copy(), expected.sizes[tracks]
         tables = _tell_apart(expected.references[tracks])
         shares = silhouettes.place(shape, owner, number, bins, centres, sizes, tables, SWEEPS)
+        kept = silhouettes.needed(shape, owner, number, bins, centres, sizes, LEAST_OWN)
+        if not kept.all():
+            tracks = tracks[kept]
+            centres, sizes = expected.centres[tracks].copy(), expected.sizes[tracks]
+            tables = _tell_apart(expected.references[tracks])
+            shares = silhouettes.place(shape, owner, number, bins, centres, sizes, tables, SWEEPS)
         if self.sizes.known(np.array([0.5 * (box[1] + box[3])]))[0]:
             more = silhouettes.unexplained(
                 shape,

@@ -204,6 +204,41 @@ def place(shape, groups, group, bins, centres, sizes, tables, sweeps):  # type: 
 
 
 @njit(cache=True)
+def needed(shape, groups, group, bins, centres, sizes, least):  # type: ignore[no-untyped-def]
+    """Tell which of K placed silhouettes explain what no other does; the least needed go first, one by one.
+
+    Args:
+        shape: (ROWS, COLUMNS) of a silhouette.
+        groups: (H, W) int32 as in `place`.
+        group: Which one.
+        bins: (H, W) colour bin of each foreground pixel.
+        centres: (K, 2) where they are.
+        sizes: (K, 2) width and height.
+        least: Share of a silhouette that must be foreground which the others do not cover.
+
+    Returns:
+        (K,) bool.
+    """
+    kept = np.ones(centres.shape[0], np.bool_)
+    even = np.zeros((2, bins.max() + 1))
+    while kept.sum() > 1:
+        left = np.flatnonzero(kept)
+        others, theirs = centres[left], sizes[left]
+        worst, which = least, -1
+        for n in range(left.size):
+            x0, y0, across, down = _window(others[n], theirs[n], 0.0)
+            own, _, _ = _gains(shape, groups, group, bins, others, theirs, n, even, x0, y0, across, down)
+            own = np.maximum(own, 0.0)
+            share = _mean(shape, own, own, x0, y0, others[n], theirs[n], 1)
+            if share < worst:
+                worst, which = share, left[n]
+        if which < 0:
+            break
+        kept[which] = False
+    return kept
+
+
+@njit(cache=True)
 def _claim(shape, gain, left, top, centre, size):  # type: ignore[no-untyped-def]
     """Take what a silhouette explains from the foreground in ``gain``, whose first pixel is left, top."""
     low_x, low_y = int(centre[0] - 0.5 * size[0]), int(centre[1] - 0.5 * size[1])

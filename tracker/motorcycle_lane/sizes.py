@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 CAPACITY = 600
 """Samples of either kind that are kept: the newest."""
-ENOUGH, ENOUGH_TRAVELLED = 30, 100
+ENOUGH, ENOUGH_TRAVELLED = 30, 40
 """Samples of both kinds from which on there is a line; those of regions that travelled, from which on they
 alone tell it."""
 BEYOND = 0.4
@@ -26,11 +26,16 @@ TOLERANCE = 0.25
 SMALLEST = 4.0
 HORIZONS = (-1.0, -0.7, -0.5, -0.35, -0.25, -0.18, -0.12, -0.06, 0.0, 0.08, 0.16, 0.25, 0.35)
 """Rows at which sizes may vanish, as shares of the picture's height; 0 is its upper border."""
+USUAL_HORIZON, HORIZON_SPREAD = -0.17, 0.2
+"""Where the horizon of a camera that looks down on traffic lies, and its standard deviation."""
+USUAL_SLOPE, SLOPE_SPREAD = 0.3, 1.0
+"""Rows of a rider's height for each that it stands below the horizon: over a camera's of six metres; and the
+standard deviation of its logarithm. Few samples of riders who hang together fit many lines."""
 LEAST_BELOW = 0.05
 """How far below the horizon a sample must lie to tell of it."""
 VOTE = 0.08
 """Width of the bins in which the logarithms of the scales are counted."""
-SMOOTHING = 1.8
+SMOOTHING = 2.5
 """By so many bins the sizes of single riders differ."""
 ASPECT, ASPECT_SPREAD = 0.45, 0.35
 """Width of a machine with its rider over their height, from front or back; and its logarithm's spread."""
@@ -94,20 +99,21 @@ class SizeModel:
         self._fresh += len(sizes)
         if told.sum() >= ENOUGH and self._fresh >= told.sum() // 8:
             self._fresh = 0
-            self._lines = robust_lines(self._rows[told] / self._scale, self._sizes[told])
+            self._lines = robust_lines(self._rows[told] / self._scale, self._sizes[told], self._scale)
             beyond = BEYOND * self._scale * np.array([-1.0, 1.0])
             self._limits = np.quantile(self._rows[told], [0.02, 0.98]) + beyond
 
 
-def robust_lines(places: Floats, sizes: Floats, rounds: int = 5) -> Floats:
+def robust_lines(places: Floats, sizes: Floats, height: float, rounds: int = 5) -> Floats:
     """Return (2, 2) offset and slope of the widths and heights that most samples agree on.
 
     Args:
         places: (K,) rows, as shares of the picture's height.
         sizes: (K, 2) width and height, px.
+        height: Of the picture, px.
         rounds: Of reweighting.
     """
-    voted = _voted(places, sizes)
+    voted = _voted(places, sizes, height)
     middle = places.mean()
     design = np.stack([np.ones(len(places)), places - middle], 1)
     start = np.stack([voted[0] + voted[1] * middle, voted[1]])
@@ -119,8 +125,11 @@ def robust_lines(places: Floats, sizes: Floats, rounds: int = 5) -> Floats:
     return np.stack([lines[0] - lines[1] * middle, lines[1]])
 
 
-def _voted(places: Floats, sizes: Floats) -> Floats:
-    """Return (2, 2) lines that vanish at one row: the horizon and the two scales that most samples share."""
+def _voted(places: Floats, sizes: Floats, height: float) -> Floats:
+    """Return (2, 2) lines that vanish at one row: the horizon and the two scales that most samples share.
+
+    Votes count by how usual the aspect, the horizon and the scale of heights are.
+    """
     most, best = -1.0, np.zeros((2, 2))
     for horizon in HORIZONS:
         below = places > horizon + LEAST_BELOW
@@ -134,7 +143,8 @@ def _voted(places: Floats, sizes: Floats) -> Floats:
         smooth = cv2.GaussianBlur(votes.astype(np.float64), (9, 9), SMOOTHING, borderType=cv2.BORDER_CONSTANT)
         centres = [low[k] + VOTE * (np.arange(n) + 0.5) for k, n in enumerate((across, down))]
         off = (centres[0][None] - centres[1][:, None] - np.log(ASPECT)) / ASPECT_SPREAD
-        smooth *= np.exp(-0.5 * off**2)
+        slope = (centres[1][:, None] - np.log(USUAL_SLOPE * height)) / SLOPE_SPREAD
+        smooth *= np.exp(-0.5 * (off**2 + slope**2 + ((horizon - USUAL_HORIZON) / HORIZON_SPREAD) ** 2))
         if smooth.max() > most:
             most = float(smooth.max())
             row, column = np.unravel_index(smooth.argmax(), smooth.shape)

@@ -86,12 +86,15 @@ def same(kind, a, b, tolerance, floor):  # type: ignore[no-untyped-def]
         return _near(a & LANES, b & LANES, tolerance) and _near(
             (a >> np.uint32(5)) & LANES, (b >> np.uint32(5)) & LANES, tolerance
         )
-    middle = 128 if kind == GRADIENT else 0
-    apart, size = 0, 0
-    for shift in range(0, 24 if kind == COLOUR else 16, 8):
-        p, q = int((a >> shift) & 255) - middle, int((b >> shift) & 255) - middle
-        apart += (p - q) * (p - q)
-        size += p * p + q * q
+    # Written out: a loop over components of which there are two or three is not unrolled.
+    middle = np.int32(128 if kind == GRADIENT else 0)
+    p, q = np.int32(a & 255) - middle, np.int32(b & 255) - middle
+    apart, size = (p - q) * (p - q), p * p + q * q
+    p, q = np.int32((a >> 8) & 255) - middle, np.int32((b >> 8) & 255) - middle
+    apart, size = apart + (p - q) * (p - q), size + p * p + q * q
+    if kind == COLOUR:
+        p, q = np.int32((a >> 16) & 255), np.int32((b >> 16) & 255)
+        apart, size = apart + (p - q) * (p - q), size + p * p + q * q
     return apart <= max(tolerance * size, floor * floor)
 
 

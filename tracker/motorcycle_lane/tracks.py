@@ -299,7 +299,7 @@ class TrackStore:
     def _learn_places(self, ended: NDArray[np.bool_]) -> None:
         """Learn where riders are, and where what ends unconfirmed, or should long have been, was seen."""
         t, hit = self.tracks, self.tracks.misses == 0
-        self._clutter.add_riders(t.centres[t.confirmed & hit & t.moved(1.0)])
+        self._clutter.add_riders(t.boxes[t.confirmed & hit & t.moved(1.0)])
         late = ~t.confirmed & hit & (t.hits > LONG_TENTATIVE)
         self._clutter.add_nothing(t.centres[late], np.ones(int(late.sum())))
         never = ended & ~t.confirmed

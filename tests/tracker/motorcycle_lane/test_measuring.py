@@ -25,7 +25,7 @@ def test_sizes_are_those_of_the_single_ones(seed):
     sizes[(kind > 0.85) & (kind < 0.9)] *= rng.uniform(1.0, 4.0, ((kind > 0.85) & (kind < 0.9)).sum())[
         :, None
     ]
-    lines = robust_lines(places, sizes)
+    lines = robust_lines(places, sizes, 240.0)
     for place in (0.1, 0.5, 0.9):
         wanted = truth[0] + truth[1] * place
         assert np.abs((lines[0] + lines[1] * place) / wanted - 1.0).max() < 0.12

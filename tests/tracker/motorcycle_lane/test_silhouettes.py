@@ -77,6 +77,22 @@ def plain_place(scene, expected, sizes, sweeps):
     return centres, np.array(shares)
 
 
+def plain_needed(scene, centres, sizes, least):
+    left = list(range(len(centres)))
+    while len(left) > 1:
+        everyone = np.ones(len(left), bool)
+        shares = [
+            plain_worth(
+                scene, centres[left], sizes[left], n, centres[k], stride=1, nearer=everyone, shown_only=True
+            )
+            for n, k in enumerate(left)
+        ]
+        if min(shares) >= least:
+            break
+        del left[int(np.argmin(shares))]
+    return np.isin(np.arange(len(centres)), left)
+
+
 def plain_unexplained(shape, groups, window, centres, sizes, offsets, slopes):
     x0, y0, x1, y1 = window
     step = max(2.0, 0.12 * (offsets[0] + slopes[0] * 0.5 * (y0 + y1)))
@@ -123,6 +139,14 @@ def test_place_is_its_plain_twin(seed, count, sweeps):
     shares = silhouettes.place(shape, groups, 1, bins, centres, sizes, tables, sweeps)
     assert np.allclose(centres, wanted)
     assert np.allclose(shares, shown, atol=1e-6)
+
+
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 4), least=st.sampled_from((0.1, 0.3, 0.6)))
+@settings(max_examples=12, deadline=None)
+def test_needed_is_its_plain_twin(seed, count, least):
+    shape, groups, bins, centres, sizes, tables = random_scene(np.random.default_rng(seed), count)
+    wanted = plain_needed((shape, groups, bins, tables), centres, sizes, least)
+    assert (silhouettes.needed(shape, groups, 1, bins, centres, sizes, least) == wanted).all()
 
 
 @given(seed=st.integers(0, 10_000), count=st.integers(0, 2), least=st.sampled_from((-1.0, 0.1, 0.45)))
