@@ -75,16 +75,16 @@ def _divide(left, right, width, borders, scales):  # type: ignore[no-untyped-def
 @njit(cache=True)
 def _sums_to(sums, row, borders, before):  # type: ignore[no-untyped-def]
     """Sum the steps of each part (P,) over the rows above a row."""
-    place = min(max(row, 0), sums.shape[0] - 1)
+    place = min(max(row, 0), sums.shape[1] - 1)
     for part in range(before.size):
-        before[part] = sums[place, borders[part + 1], SIGNED] - sums[place, borders[part], SIGNED]
+        before[part] = sums[SIGNED, place, borders[part + 1]] - sums[SIGNED, place, borders[part]]
 
 
 @njit(cache=True)
 def _next_step(sums, row, borders, before, part):  # type: ignore[no-untyped-def]
     """Return the sum of a part's steps at a row, given that over the rows above, which goes on to the next."""
-    place = min(max(row + 1, 0), sums.shape[0] - 1)
-    now = sums[place, borders[part + 1], SIGNED] - sums[place, borders[part], SIGNED]
+    place = min(max(row + 1, 0), sums.shape[1] - 1)
+    now = sums[SIGNED, place, borders[part + 1]] - sums[SIGNED, place, borders[part]]
     gain = now - before[part]
     before[part] = now
     return gain
@@ -99,7 +99,7 @@ def foot(sums, left, right, row, play, level):  # type: ignore[no-untyped-def]
     dark.
     """
     borders, before, scales = np.empty(5, np.int64), np.empty(4, np.int64), np.empty(4)
-    _divide(left, right, sums.shape[1] - 1, borders, scales)
+    _divide(left, right, sums.shape[2] - 1, borders, scales)
     _sums_to(sums, int(row) - play, borders, before)
     scales /= level
     best, best_least, best_mean = int(row), -1.0, -1.0
@@ -128,7 +128,7 @@ def roof(sums, x0, x1, row, rear, body_top, tall):  # type: ignore[no-untyped-de
         body_top: Row of the highest point that moves with the vehicle: it lies under the roof.
         tall: Whether a van's or a lorry's roof is sought, or a car's.
     """
-    width = sums.shape[1] - 1
+    width = sums.shape[2] - 1
     wide = x1 - x0
     left, right = int(max(x0 + 0.12 * wide, 0.0)), int(min(x1 - 0.12 * wide, width))
     usual, spread = (TALL_ASPECT, TALL_SPREAD) if tall else (ASPECT, ASPECT_SPREAD)
@@ -158,13 +158,13 @@ def roof(sums, x0, x1, row, rear, body_top, tall):  # type: ignore[no-untyped-de
 @njit(cache=True)
 def _strengths(sums, least, most, top, bottom, strength):  # type: ignore[no-untyped-def]
     """Write the mean vertical edge over rows [top, bottom) of columns [least, most]; 0 beyond the picture."""
-    height, width = sums.shape[0] - 1, sums.shape[1] - 1
+    height, width = sums.shape[1] - 1, sums.shape[2] - 1
     top, bottom = min(max(top, 0), height), min(max(bottom, 0), height)
-    below, above = sums[bottom], sums[top]
-    before = below[least, ACROSS] - above[least, ACROSS]
+    below, above = sums[ACROSS, bottom], sums[ACROSS, top]
+    before = below[least] - above[least]
     scale = 0.5 / max(bottom - top, 1)
     for j in range(least, most + 1):
-        now = below[min(j + 1, width), ACROSS] - above[min(j + 1, width), ACROSS]
+        now = below[min(j + 1, width)] - above[min(j + 1, width)]
         strength[j] = scale * (now - before)
         before = now
 
@@ -172,7 +172,7 @@ def _strengths(sums, least, most, top, bottom, strength):  # type: ignore[no-unt
 @njit(cache=True)
 def _pairs(sums, x, y, horizon, middle, focal, rows, limit):  # type: ignore[no-untyped-def]
     """Pair vertical edges over every row: (K, 5) x0, x1, row, promise, number of the row."""
-    width = sums.shape[1] - 1
+    width = sums.shape[2] - 1
     found = np.empty((limit, 5))
     used = 0
     strength, counts = np.zeros(width + 1), np.zeros(width + 2)
@@ -252,7 +252,7 @@ def _pairs(sums, x, y, horizon, middle, focal, rows, limit):  # type: ignore[no-
 @njit(cache=True)
 def _with_feet(sums, pairs, horizon, middle, focal):  # type: ignore[no-untyped-def]
     """Put pairs (K, 5) on the feet next to their rows, and multiply in what these promise, in place."""
-    width = sums.shape[1] - 1
+    width = sums.shape[2] - 1
     for k in range(len(pairs)):
         x0, x1, row = pairs[k, 0], pairs[k, 1], pairs[k, 2]
         contact = row - horizon
@@ -274,7 +274,7 @@ def outlines(relief: Relief, likely: Floats, farthest: float) -> Floats:
         likely: (N, 2) points that move like a vehicle, below the horizon.
         farthest: Height of the horizon above the farthest contact row, px.
     """
-    nearest = len(relief.sums) - 2.0 - relief.horizon
+    nearest = relief.shape[0] - 1.0 - relief.horizon
     heights = [farthest]
     while heights[-1] < nearest:
         heights.append(max(heights[-1] * ROW_STEP, heights[-1] + 1.0))
@@ -285,7 +285,8 @@ def outlines(relief: Relief, likely: Floats, farthest: float) -> Floats:
     _with_feet(relief.sums, pairs, *scene)
     found = _best(pairs, KEPT)[:, :3]
     # Neighbouring rows may come to the same foot.
-    number = (found[:, 2] * relief.sums.shape[1] + found[:, 0]) * relief.sums.shape[1] + found[:, 1]
+    width = relief.shape[1]
+    number = (found[:, 2] * (width + 1) + found[:, 0]) * (width + 1) + found[:, 1]
     _, first = np.unique(number, return_index=True)
     return np.ascontiguousarray(found[np.sort(first)])
 

@@ -169,7 +169,7 @@ class VehicleStore:
         least = LIKELY if speed > WALK else UNCLEAR
         free = (points.evidence > least) | on_lamp(relief, points.position)
         likely = ripe & free & (points.position[:, 1] > relief.horizon + 2.0)
-        shape = len(relief.sums) - 1, relief.sums.shape[1] - 1
+        shape = relief.shape
         expected = np.array([_outline(vehicle.box, *shape) for vehicle in self.vehicles]).reshape(-1, 3)
         expected[:, 2] = np.maximum(expected[:, 2], relief.horizon + 4.0)
         found = expected
@@ -208,7 +208,7 @@ class VehicleStore:
     ) -> None:
         """Pull a vehicle's box to the likeliest outline near it, and weigh it by that."""
         x0, x1, row = expected
-        height, width = len(relief.sums) - 1, relief.sums.shape[1] - 1
+        height, width = relief.shape
         wide = max(x1 - x0, 1.0)
         play = PLAY * wide + 1.0
         widths = np.log((windows[:, 2] - windows[:, 0]) / np.maximum(windows[:, 3] - relief.horizon, 1.0))
@@ -361,7 +361,7 @@ class VehicleStore:
         """Begin a vehicle in an outline (4,) that no other one holds and that has points of its own."""
         if any(covered(box, other.box) > TAKEN for other in self.vehicles):
             return
-        wide, tall, width = box[2] - box[0], box[3] - box[1], relief.sums.shape[1] - 1
+        wide, tall, width = box[2] - box[0], box[3] - box[1], relief.shape[1]
         x, y = points.position.T
         inside = likely & (x > box[0] - 0.05 * wide) & (x < box[2] + 0.05 * wide)
         inside &= (y > box[1] - 0.05 * tall) & (y < box[3] + 0.05 * tall)
