@@ -24,7 +24,7 @@ MOST_LEAVES = 32
 
 
 class Trees(NamedTuple):
-    """T trees of `MOST_LEAVES` leaves at most, their nodes one after the other; a node's left child follows it.
+    """T trees of `MOST_LEAVES` leaves at most, node after node; a node's left child follows it.
 
     Attributes:
         roots: (T,) int32, where each tree begins.

@@ -82,7 +82,7 @@ def _sums_to(sums, row, borders, before):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _next_step(sums, row, borders, before, part):  # type: ignore[no-untyped-def]
-    """Return the sum of a part's steps at a row, given that over the rows above, which goes on to the next."""
+    """Return the sum of a part's steps at a row, and carry that over the rows above on to the next."""
     place = min(max(row + 1, 0), sums.shape[1] - 1)
     now = sums[SIGNED, place, borders[part + 1]] - sums[SIGNED, place, borders[part]]
     gain = now - before[part]
