@@ -145,7 +145,7 @@ class InCarTracker:
         owners = _in_boxes(traces, tracks, INNER)
         rims = _in_boxes(traces, tracks, -RIM)
         near = self._nearby_evidence(traces, scale)
-        cast, above = _at_feet(traces, tracks), _over_roofs(traces, tracks)
+        cast = _at_feet(traces, tracks)
         labels = np.zeros(len(traces), np.uint8)
         chances = np.full(len(traces), 0.5)
         sure = dict(zip(tracks.ids.tolist(), (tracks.status != Status.TENTATIVE).tolist(), strict=True))
@@ -158,7 +158,7 @@ class InCarTracker:
                 gain = 0.5 * near[index]
             elif cast[index]:
                 gain = min(near[index], 0.0) - UNBOXED
-            elif above[index] or (rims[index] and sure[rims[index]]):
+            elif rims[index] and sure[rims[index]]:
                 gain = near[index]
             else:
                 gain = near[index] - UNBOXED
@@ -208,18 +208,6 @@ def _at_feet(traces: TraceSet, tracks: Tracks) -> NDArray[np.bool_]:
     x, y = traces.x[:, None], traces.y[:, None]
     beside = (x > boxes[:, 0] - wide) & (x < boxes[:, 2] + wide)
     return np.asarray((beside & (y > boxes[:, 3] - 0.1 * tall) & (y < boxes[:, 3] + 1.5 * tall)).any(1))
-
-
-def _over_roofs(traces: TraceSet, tracks: Tracks) -> NDArray[np.bool_]:
-    """Tell which traces (N,) lie over a track's roof, no higher than the track is wide.
-
-    A bus or lorry may go on there.
-    """
-    boxes = tracks.boxes[tracks.status != Status.TENTATIVE]
-    wide, tall = boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]
-    x, y = traces.x[:, None], traces.y[:, None]
-    over = (x > boxes[:, 0]) & (x < boxes[:, 2]) & (traces.width[:, None] < 1.3 * wide)
-    return np.asarray((over & (y <= boxes[:, 1] - 0.1 * tall) & (y > boxes[:, 1] - wide)).any(1))
 
 
 def _in_boxes(traces: TraceSet, tracks: Tracks, margin: float) -> NDArray[np.int64]:
