@@ -70,3 +70,15 @@ def inward(relative: NDArray[np.float64], moved: NDArray[np.float64]) -> float:
     """Return how far points (N, 2) from the focus of expansion that moved by (N, 2) came nearer to it, px."""
     away = np.maximum(np.hypot(relative[:, 0], relative[:, 1]), 1.0)
     return -float(np.median((moved * relative).sum(1) / away))
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def covered(box: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Return the shared area over the smaller box's area."""
+    wide = min(box[2], other[2]) - max(box[0], other[0])
+    tall = min(box[3], other[3]) - max(box[1], other[1])
+    if wide <= 0 or tall <= 0:
+        return 0.0
+    smaller = min((box[2] - box[0]) * (box[3] - box[1]), (other[2] - other[0]) * (other[3] - other[1]))
+    share: float = wide * tall / max(smaller, 1e-9)
+    return share

@@ -114,7 +114,7 @@ MIRROR = 12
 @njit(cache=True)
 def _look(sums, outline, scene, row_out):  # type: ignore[no-untyped-def]
     """Write the cues of edges and brightness of one outline (x0, x1, row)."""
-    height, width = sums.shape[0] - 1, sums.shape[1] - 1
+    height, width = sums.shape[1] - 1, sums.shape[2] - 1
     x0, x1, row = outline
     horizon, middle, focal = scene
     wide, contact = x1 - x0, row - horizon
@@ -266,14 +266,14 @@ def _weaker_side(sums, x0, x1, first, last, level):  # type: ignore[no-untyped-d
     weaker = 4.0
     if x0 >= 3.0:
         weaker = min(weaker, side(sums, x0, first, last) / level)
-    if x1 <= sums.shape[1] - 4.0:
+    if x1 <= sums.shape[2] - 4.0:
         weaker = min(weaker, side(sums, x1, first, last) / level)
     return weaker
 
 
 @njit(cache=True)
 def _cues(sums, outlines, x, y, u, v, evidence, scene):  # type: ignore[no-untyped-def]
-    width = sums.shape[1] - 1
+    width = sums.shape[2] - 1
     count = outlines.shape[0]
     found, boxes = np.zeros((2 * count, COUNT)), np.empty((2 * count, 4))
     for k in range(count):

@@ -23,7 +23,7 @@ def on_lamp(relief: Relief, position: Floats) -> NDArray[np.bool_]:
 
 def _redness(relief: Relief, column: NDArray[np.int64], row: NDArray[np.int64], reach: int) -> Floats:
     """Return the mean redness (N,) within so many px of pixels (N,)."""
-    red = relief.sums[..., RED]
+    red = relief.sums[RED]
     height, width = red.shape
     x0, x1 = (column - reach).clip(0), (column + reach + 1).clip(0, width - 1)
     y0, y1 = (row - reach).clip(0), (row + reach + 1).clip(0, height - 1)

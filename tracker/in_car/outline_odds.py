@@ -19,10 +19,12 @@ Floats = NDArray[np.float64]
 
 # After so many trees an outline with odds below HOPELESS is given up: the others could not save it.
 FIRST, HOPELESS = 40, -4.0
+# A tree's leaves have a bit each in a word.
+MOST_LEAVES = 32
 
 
 class Trees(NamedTuple):
-    """T trees, their nodes one after the other; a node's left child follows it.
+    """T trees of `MOST_LEAVES` leaves at most, node after node; a node's left child follows it.
 
     Attributes:
         roots: (T,) int32, where each tree begins.
@@ -45,24 +47,48 @@ def learnt_trees() -> Trees:
 
 
 @njit(cache=True)
+def _hash(bit):  # type: ignore[no-untyped-def]
+    """Return a number below 32 that is another one for each power of two (de Bruijn)."""
+    return np.uint32(bit * np.uint32(0x077CB531)) >> np.uint32(27)
+
+
+@njit(cache=True)
 def _sum(found, roots, cues, limits, rights):  # type: ignore[no-untyped-def]
-    count = found.shape[0]
-    result = np.zeros(count)
-    alive, number = np.arange(count), count
-    # Tree by tree, since a tree stays in the fastest memory while all outlines go down it.
+    """Add up the trees' leaves for outlines with the cues (K, C).
+
+    All nodes of a tree are asked of all outlines, which takes no branch and several outlines at a time: a
+    node that leads to the right strikes out the leaves on its left, and the first that is left over is the
+    one (QuickScorer; Lucchese et al., SIGIR 2015).
+    """
+    number = found.shape[0]
+    result, alive = np.zeros(number), np.arange(number)
+    columns = np.ascontiguousarray(found.T)
+    remaining = np.empty(number, np.uint32)
+    # Leaves that come before a node, and the values of a tree's leaves in the order of their bits' hashes.
+    before, values = np.zeros(cues.size, np.int64), np.zeros(MOST_LEAVES, np.float32)
     for k in range(roots.size):
         if k == FIRST:
-            number = 0
-            for i in range(count):
-                if result[i] >= HOPELESS:
-                    alive[number] = i
-                    number += 1
-        for place in range(number):
-            i = alive[place]
-            node = roots[k]
-            while cues[node] >= 0:
-                node = node + 1 if found[i, cues[node]] <= limits[node] else rights[node]
-            result[i] += limits[node]
+            alive = np.flatnonzero(result >= HOPELESS)
+            columns = columns[:, alive]
+            number = alive.size
+        root, end = roots[k], roots[k + 1] if k + 1 < roots.size else cues.size
+        leaves = 0
+        for node in range(root, end):
+            before[node] = leaves
+            if cues[node] < 0:
+                values[_hash(np.uint32(1) << np.uint32(leaves))] = limits[node]
+                leaves += 1
+        remaining[:] = np.uint32(0xFFFFFFFF)
+        for node in range(root, end):
+            if cues[node] >= 0:
+                struck = (np.int64(1) << before[rights[node]]) - (np.int64(1) << before[node])
+                kept = np.uint32(~struck & 0xFFFFFFFF)
+                column, limit = columns[cues[node]], limits[node]
+                for i in range(number):
+                    remaining[i] &= kept if column[i] > limit else np.uint32(0xFFFFFFFF)
+        for i in range(number):
+            bits = remaining[i]
+            result[alive[i]] += values[_hash(bits & (~bits + np.uint32(1)))]
     return result
 
 

@@ -60,6 +60,37 @@ def side(sums, place, top, bottom):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _divide(left, right, width, borders, scales):  # type: ignore[no-untyped-def]
+    """Divide columns [left, right), cut to the picture, into equal parts.
+
+    Writes the borders (P + 1,), and what makes a part's sum a mean in grey levels (P,).
+    """
+    parts = scales.size
+    for part in range(parts + 1):
+        borders[part] = min(max(left + (part * (right - left)) // parts, 0), width)
+    for part in range(parts):
+        scales[part] = 0.5 / max(borders[part + 1] - borders[part], 1)
+
+
+@njit(cache=True)
+def _sums_to(sums, row, borders, before):  # type: ignore[no-untyped-def]
+    """Sum the steps of each part (P,) over the rows above a row."""
+    place = min(max(row, 0), sums.shape[1] - 1)
+    for part in range(before.size):
+        before[part] = sums[SIGNED, place, borders[part + 1]] - sums[SIGNED, place, borders[part]]
+
+
+@njit(cache=True)
+def _next_step(sums, row, borders, before, part):  # type: ignore[no-untyped-def]
+    """Return the sum of a part's steps at a row, and carry that over the rows above on to the next."""
+    place = min(max(row + 1, 0), sums.shape[1] - 1)
+    now = sums[SIGNED, place, borders[part + 1]] - sums[SIGNED, place, borders[part]]
+    gain = now - before[part]
+    before[part] = now
+    return gain
+
+
+@njit(cache=True)
 def foot(sums, left, right, row, play, level):  # type: ignore[no-untyped-def]
     """Return the row within ``play`` of ``row`` that is the likeliest lower end of a vehicle.
 
@@ -67,13 +98,16 @@ def foot(sums, left, right, row, play, level):  # type: ignore[no-untyped-def]
     vehicles and the road between them have none. Dark over bright (the shadow) is worth more than bright over
     dark.
     """
-    wide = right - left
+    borders, before, scales = np.empty(5, np.int64), np.empty(4, np.int64), np.empty(4)
+    _divide(left, right, sums.shape[2] - 1, borders, scales)
+    _sums_to(sums, int(row) - play, borders, before)
+    scales /= level
     best, best_least, best_mean = int(row), -1.0, -1.0
     for i in range(int(row) - play, int(row) + play + 1):
         least, total = 1e9, 0.0
         for part in range(4):
-            step = mean(sums, SIGNED, left + (part * wide) // 4, i, left + ((part + 1) * wide) // 4, i + 1)
-            value = min(max(step, -0.5 * step) / level, 4.0)
+            step = scales[part] * _next_step(sums, i, borders, before, part)
+            value = min(max(step, -0.5 * step), 4.0)
             least = min(least, value)
             total += 0.25 * value
         if least + total > best_least + best_mean:
@@ -94,23 +128,27 @@ def roof(sums, x0, x1, row, rear, body_top, tall):  # type: ignore[no-untyped-de
         body_top: Row of the highest point that moves with the vehicle: it lies under the roof.
         tall: Whether a van's or a lorry's roof is sought, or a car's.
     """
-    width = sums.shape[1] - 1
+    width = sums.shape[2] - 1
     wide = x1 - x0
     left, right = int(max(x0 + 0.12 * wide, 0.0)), int(min(x1 - 0.12 * wide, width))
     usual, spread = (TALL_ASPECT, TALL_SPREAD) if tall else (ASPECT, ASPECT_SPREAD)
     first = int(max(row - (TALLEST if tall else DIVIDE) * rear, 2))
     last = int(row - (DIVIDE if tall else LOWEST) * rear)
     level = mean(sums, DOWN, left, first, right, int(row)) + 3.0
+    borders, before, scales = np.empty(4, np.int64), np.empty(3, np.int64), np.empty(3)
+    _divide(left, right, width, borders, scales)
+    _sums_to(sums, first, borders, before)
+    scales /= level
     best, found, strength = -1e9, row - usual * rear, 0.0
+    per_rear, per_spread, third = 1.0 / rear, 1.0 / spread, 1.0 / 3.0
     for i in range(first, last):
-        off = ((row - i) / rear - usual) / spread
+        off = ((row - i) * per_rear - usual) * per_spread
         least, total = 1e9, 0.0
         for part in range(3):
-            a, b = left + (part * (right - left)) // 3, left + ((part + 1) * (right - left)) // 3
-            value = min(abs(mean(sums, SIGNED, a, i, b, i + 1)) / level, 4.0)
+            value = min(scales[part] * abs(_next_step(sums, i, borders, before, part)), 4.0)
             least = min(least, value)
-            total += value / 3.0
-        beyond = min(max((i - body_top) / rear - 0.04, 0.0) * 12.0, 4.0)
+            total += third * value
+        beyond = min(max((i - body_top) * per_rear - 0.04, 0.0) * 12.0, 4.0)
         value = 0.5 * least + 0.7 * total - 0.5 * off * off - beyond
         if value > best:
             best, found, strength = value, float(i), 0.5 * (least + total)
@@ -118,9 +156,23 @@ def roof(sums, x0, x1, row, rear, body_top, tall):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
+def _strengths(sums, least, most, top, bottom, strength):  # type: ignore[no-untyped-def]
+    """Write the mean vertical edge over rows [top, bottom) of columns [least, most]; 0 beyond the picture."""
+    height, width = sums.shape[1] - 1, sums.shape[2] - 1
+    top, bottom = min(max(top, 0), height), min(max(bottom, 0), height)
+    below, above = sums[ACROSS, bottom], sums[ACROSS, top]
+    before = below[least] - above[least]
+    scale = 0.5 / max(bottom - top, 1)
+    for j in range(least, most + 1):
+        now = below[min(j + 1, width)] - above[min(j + 1, width)]
+        strength[j] = scale * (now - before)
+        before = now
+
+
+@njit(cache=True)
 def _pairs(sums, x, y, horizon, middle, focal, rows, limit):  # type: ignore[no-untyped-def]
     """Pair vertical edges over every row: (K, 5) x0, x1, row, promise, number of the row."""
-    width = sums.shape[1] - 1
+    width = sums.shape[2] - 1
     found = np.empty((limit, 5))
     used = 0
     strength, counts = np.zeros(width + 1), np.zeros(width + 2)
@@ -143,8 +195,7 @@ def _pairs(sums, x, y, horizon, middle, focal, rows, limit):  # type: ignore[no-
         for j in range(width):
             counts[j + 1] += counts[j]
         least, most = max(least, 0), min(most, width)
-        for j in range(least, most + 1):
-            strength[j] = mean(sums, ACROSS, j, top, j + 1, bottom)
+        _strengths(sums, least, most, top, bottom, strength)
         floor = mean(sums, ACROSS, least, top, most, bottom) + 1.0
         number = 0
         apart = max(1, int(APART * usual))
@@ -201,7 +252,7 @@ def _pairs(sums, x, y, horizon, middle, focal, rows, limit):  # type: ignore[no-
 @njit(cache=True)
 def _with_feet(sums, pairs, horizon, middle, focal):  # type: ignore[no-untyped-def]
     """Put pairs (K, 5) on the feet next to their rows, and multiply in what these promise, in place."""
-    width = sums.shape[1] - 1
+    width = sums.shape[2] - 1
     for k in range(len(pairs)):
         x0, x1, row = pairs[k, 0], pairs[k, 1], pairs[k, 2]
         contact = row - horizon
@@ -223,7 +274,7 @@ def outlines(relief: Relief, likely: Floats, farthest: float) -> Floats:
         likely: (N, 2) points that move like a vehicle, below the horizon.
         farthest: Height of the horizon above the farthest contact row, px.
     """
-    nearest = len(relief.sums) - 2.0 - relief.horizon
+    nearest = relief.shape[0] - 1.0 - relief.horizon
     heights = [farthest]
     while heights[-1] < nearest:
         heights.append(max(heights[-1] * ROW_STEP, heights[-1] + 1.0))
@@ -232,13 +283,33 @@ def outlines(relief: Relief, likely: Floats, farthest: float) -> Floats:
     rows = np.round(relief.horizon + np.array(heights))
     pairs = _best(_pairs(relief.sums, x, y, *scene, rows, 40_000), PAIRS)
     _with_feet(relief.sums, pairs, *scene)
-    return np.ascontiguousarray(_best(pairs, KEPT)[:, :3])
+    found = _best(pairs, KEPT)[:, :3]
+    # Neighbouring rows may come to the same foot.
+    width = relief.shape[1]
+    number = (found[:, 2] * (width + 1) + found[:, 0]) * (width + 1) + found[:, 1]
+    _, first = np.unique(number, return_index=True)
+    return np.ascontiguousarray(found[np.sort(first)])
 
 
-def _best(pairs: Floats, most: int) -> Floats:
-    """Return the most promising of (K, 5) in each row: far vehicles promise less than near ones."""
-    # By row, then by promise, which lies below 100.
-    pairs = pairs[np.argsort(100.0 * pairs[:, 4] - pairs[:, 3], kind="stable")]
-    first = np.searchsorted(pairs[:, 4], pairs[:, 4])
-    best: Floats = pairs[np.arange(len(pairs)) - first < most]
-    return best
+@njit(cache=True)
+def _best(pairs, most):  # type: ignore[no-untyped-def]
+    """Return the most promising of (K, 5) in each row, best first: far vehicles promise less than near ones.
+
+    The pairs come row by row.
+    """
+    kept = np.empty_like(pairs)
+    first = used = 0
+    for k in range(len(pairs)):
+        if k > 0 and pairs[k, 4] != pairs[k - 1, 4]:
+            first = used
+        if used - first == most:
+            if pairs[k, 3] <= kept[used - 1, 3]:
+                continue
+            used -= 1
+        place = used
+        while place > first and kept[place - 1, 3] < pairs[k, 3]:
+            kept[place] = kept[place - 1]
+            place -= 1
+        kept[place] = pairs[k]
+        used += 1
+    return kept[:used]

@@ -18,7 +18,7 @@ class Relief:
     """A picture's integral images, and what is known of the scene.
 
     Attributes:
-        sums: (h + 1, w + 1, 5) int32, in half grey levels, the layers side by side.
+        sums: (5, h + 1, w + 1) int32, in half grey levels, by layer.
         horizon: Row, px.
         middle: Column of the focus of expansion, px.
         focal: Px.
@@ -29,12 +29,18 @@ class Relief:
     middle: float
     focal: float
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the picture, px."""
+        return self.sums.shape[1] - 1, self.sums.shape[2] - 1
+
 
 @njit(cache=True)
 def _integrals(grey, redness):  # type: ignore[no-untyped-def]
     height, width = grey.shape
-    sums = np.empty((height + 1, width + 1, 5), np.int32)
-    sums[0] = 0
+    sums = np.empty((5, height + 1, width + 1), np.int32)
+    sums[:, 0] = 0
+    sums[:, :, 0] = 0
     # Of each column down to the present row.
     across, bright = np.zeros(width, np.int32), np.zeros(width, np.int32)
     signed, down = np.zeros(width, np.int32), np.zeros(width, np.int32)
@@ -54,8 +60,6 @@ def _integrals(grey, redness):  # type: ignore[no-untyped-def]
                 step = np.int32(here[j]) + np.int32(below[j]) - np.int32(above[j]) - np.int32(top[j])
                 signed[j] += step
                 down[j] += abs(step)
-        row = sums[i + 1]
-        row[0] = 0
         a, s, d, b, r = np.int32(0), np.int32(0), np.int32(0), np.int32(0), np.int32(0)
         for j in range(width):
             a += across[j]
@@ -63,11 +67,11 @@ def _integrals(grey, redness):  # type: ignore[no-untyped-def]
             d += down[j]
             b += bright[j]
             r += red[j]
-            row[j + 1, 0] = a
-            row[j + 1, 1] = s
-            row[j + 1, 2] = d
-            row[j + 1, 3] = b
-            row[j + 1, 4] = r
+            sums[ACROSS, i + 1, j + 1] = a
+            sums[SIGNED, i + 1, j + 1] = s
+            sums[DOWN, i + 1, j + 1] = d
+            sums[BRIGHT, i + 1, j + 1] = b
+            sums[RED, i + 1, j + 1] = r
     return sums
 
 
@@ -84,10 +88,11 @@ def mean(sums, layer, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
 
     Cut to the picture; 0 where that is empty. The sums count half levels.
     """
-    height, width = sums.shape[0] - 1, sums.shape[1] - 1
+    height, width = sums.shape[1] - 1, sums.shape[2] - 1
     x0, x1 = min(max(x0, 0), width), min(max(x1, 0), width)
     y0, y1 = min(max(y0, 0), height), min(max(y1, 0), height)
     if x1 <= x0 or y1 <= y0:
         return 0.0
-    total = sums[y1, x1, layer] - sums[y0, x1, layer] - sums[y1, x0, layer] + sums[y0, x0, layer]
+    plane = sums[layer]
+    total = plane[y1, x1] - plane[y0, x1] - plane[y1, x0] + plane[y0, x0]
     return 0.5 * total / ((x1 - x0) * (y1 - y0))

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from tracker.in_car.body import body_motion, inward
+from tracker.in_car.body import body_motion, covered, inward
 from tracker.in_car.cues import Cue, cues
 from tracker.in_car.features import Picture
 from tracker.in_car.lamps import on_lamp
@@ -32,8 +31,9 @@ BEGIN, EVEN, MOST = 0.5, -1.0, 4.0
 # The odds at which it is begun if its points agree, and sums of their log odds: so many speak for it, so few
 # against.
 AGREED, MANY, FEW = -0.5, 12.0, 1.0
-# Seconds before a vehicle is judged by how it moves.
-YOUNG = 0.2
+# Seconds before a vehicle is judged by how it moves; and for which all of one must have looked like nothing
+# else, while the ego drove, to make it sure however few points are on it.
+YOUNG, LONG = 0.2, 1.0
 # Outlines are looked at once in so many frames.
 SEARCH = 3
 # Play of an outline's sides and foot around where they are expected, as a share of the width, and of the
@@ -77,6 +77,7 @@ class Vehicle:
         whole: Whether the frame ever showed both its sides.
         inward: How far its points moved toward the focus of expansion over `CORRELATION` seconds, px.
         rivals: Looks in a row at which another outline was better.
+        certain: Looks in a row at which all of it was seen, and its odds were as high as they can be.
     """
 
     id: int
@@ -92,6 +93,7 @@ class Vehicle:
     whole: bool = False
     inward: float = 0.0
     rivals: int = 0
+    certain: int = 0
 
     @property
     def status(self) -> Status:
@@ -169,7 +171,7 @@ class VehicleStore:
         least = LIKELY if speed > WALK else UNCLEAR
         free = (points.evidence > least) | on_lamp(relief, points.position)
         likely = ripe & free & (points.position[:, 1] > relief.horizon + 2.0)
-        shape = len(relief.sums) - 1, relief.sums.shape[1] - 1
+        shape = relief.shape
         expected = np.array([_outline(vehicle.box, *shape) for vehicle in self.vehicles]).reshape(-1, 3)
         expected[:, 2] = np.maximum(expected[:, 2], relief.horizon + 4.0)
         found = expected
@@ -208,7 +210,7 @@ class VehicleStore:
     ) -> None:
         """Pull a vehicle's box to the likeliest outline near it, and weigh it by that."""
         x0, x1, row = expected
-        height, width = len(relief.sums) - 1, relief.sums.shape[1] - 1
+        height, width = relief.shape
         wide = max(x1 - x0, 1.0)
         play = PLAY * wide + 1.0
         widths = np.log((windows[:, 2] - windows[:, 0]) / np.maximum(windows[:, 3] - relief.horizon, 1.0))
@@ -230,7 +232,10 @@ class VehicleStore:
         vehicle.whole = vehicle.whole or not cut
         least = 2 if vehicle.whole else CROWDED * math.sqrt(wide)
         proven = vehicle.odds > CONFIRM and vehicle.age >= YOUNG * self._rate and vehicle.members >= least
-        if proven and (vehicle.whole or vehicle.inward > INWARD):
+        certain = vehicle.whole and vehicle.odds >= HIGHEST and speed > WALK
+        vehicle.certain = vehicle.certain + 1 if certain else 0
+        lasting = vehicle.certain * SEARCH >= LONG * self._rate
+        if lasting or (proven and (vehicle.whole or vehicle.inward > INWARD)):
             vehicle.confirmed = True
         if odds[best] > 0.0:
             vehicle.missed = 0
@@ -361,7 +366,7 @@ class VehicleStore:
         """Begin a vehicle in an outline (4,) that no other one holds and that has points of its own."""
         if any(covered(box, other.box) > TAKEN for other in self.vehicles):
             return
-        wide, tall, width = box[2] - box[0], box[3] - box[1], relief.sums.shape[1] - 1
+        wide, tall, width = box[2] - box[0], box[3] - box[1], relief.shape[1]
         x, y = points.position.T
         inside = likely & (x > box[0] - 0.05 * wide) & (x < box[2] + 0.05 * wide)
         inside &= (y > box[1] - 0.05 * tall) & (y < box[3] + 0.05 * tall)
@@ -384,15 +389,3 @@ def _outline(box: Floats, height: int, width: int) -> tuple[float, float, float]
     x0 = min(max(float(box[0]), 0.0), width - 1.0)
     x1 = min(max(float(box[2]), x0 + 1.0), float(width))
     return x0, x1, min(float(box[3]), height - 1.0)
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def covered(box: Floats, other: Floats) -> float:
-    """Return the shared area over the smaller box's area."""
-    wide = min(box[2], other[2]) - max(box[0], other[0])
-    tall = min(box[3], other[3]) - max(box[1], other[1])
-    if wide <= 0 or tall <= 0:
-        return 0.0
-    smaller = min((box[2] - box[0]) * (box[3] - box[1]), (other[2] - other[0]) * (other[3] - other[1]))
-    share: float = wide * tall / max(smaller, 1e-9)
-    return share

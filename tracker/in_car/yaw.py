@@ -28,6 +28,9 @@ USUAL_SPEED, SPEED_SPREAD, HEIGHT_SPREAD = 20.0, 1.0, 0.4
 LEFT_OVER, FOCUS_MEMORY = 3.0, 5.0
 # Seconds for which the histogram of the ground's expansion remembers, without and with an odometer.
 MEMORY, LONG_MEMORY = 0.7, 4.0
+# The ego stands where no more than a share of all points, at least so far from the focus of expansion and
+# followed for so long (px, s), moved by this many px; of fewer points nothing is concluded.
+STIRRING, OFF_FOCUS, FOLLOWED, STIRRED, ENOUGH = 0.35, 40.0, 0.25, 1.5, 20
 
 
 @njit(cache=True)
@@ -263,9 +266,13 @@ class EgoMotion:
             gain = min(1.0, 3.0 / self._rate) * total / (total + 2.0)
             self._moving += gain * (float(value[expanding].sum()) / max(total, 1e-9) - self._moving)
             going, support = self._peak(USUAL_SPEED, SPEED_SPREAD)
-            if self._moving < 0.1:
+            gain = min(1.0, 6.0 / self._rate)
+            if self._stands(position, moved, seconds):
                 going = 0.0
-            gain = min(1.0, 6.0 / self._rate) * support / (support + 2.0)
+            else:
+                gain *= support / (support + 2.0)
+                if self._moving < 0.1:
+                    going = 0.0
             self.ground += gain * (going / (self.focal * HEIGHT) - self.ground)
             return
         if speed > 3.0:
@@ -276,6 +283,13 @@ class EgoMotion:
             factor = place / USUAL_SPEED / (self.focal * HEIGHT)
             self._per_speed += 0.1 * support / (support + 20.0) * (factor - self._per_speed)
         self.ground = max(0.0, speed * self._per_speed)
+
+    def _stands(self, position: Floats, moved: Floats, seconds: Floats) -> bool:
+        """Tell whether so little moves in the picture, vehicles included, that the ego cannot move."""
+        away = position - self.focus
+        told = (seconds > FOLLOWED) & (np.hypot(away[:, 0], away[:, 1]) > OFF_FOCUS)
+        stirred = np.abs(moved[told]).max(1) > STIRRED
+        return len(stirred) >= ENOUGH and float(stirred.mean()) < STIRRING
 
     def _gather(self, speeds: Floats, errors: Floats, weights: Floats, memory: float) -> None:
         """Add measured speeds, m/s, to the histogram of their logarithms."""

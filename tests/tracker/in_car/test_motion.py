@@ -59,6 +59,20 @@ def test_focus_and_ground_are_learnt():
     assert ego.speed == pytest.approx(20.0, rel=0.15)
 
 
+@pytest.mark.parametrize(("others", "standing"), [(0, True), (30, True), (60, False)])
+def test_the_ego_stands_where_next_to_nothing_moves(others, standing):
+    rng = np.random.default_rng(4)
+    ego = EgoMotion(focal=FOCAL, focus=tuple(FOCUS), sure=True, rate=RATE)
+    before = ego.speed
+    for _ in range(40):
+        position = FOCUS + rng.choice([-1, 1], (120, 2)) * rng.uniform(50, 200, (120, 2))
+        moved = rng.normal(0, 0.3, (120, 2))
+        # The traffic that passes by says nothing of the ego.
+        moved[:others, 0] = 8.0
+        ego.learn(position, moved, np.full(120, 0.3), np.zeros(120))
+    assert (ego.speed < 0.1 * before) == standing
+
+
 def test_vehicles_and_scenery_are_told_apart():
     rng = np.random.default_rng(3)
     seconds, speed = 0.35, 20.0

@@ -7,7 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracker.in_car.cues import COUNT
-from tracker.in_car.outline_odds import FIRST, HOPELESS, Trees, _sum, learnt_trees, log_odds
+from tracker.in_car.outline_odds import (
+    FIRST,
+    HOPELESS,
+    MOST_LEAVES,
+    Trees,
+    _hash,
+    _sum,
+    learnt_trees,
+    log_odds,
+)
 
 
 def leaf(grown, node, row):
@@ -45,7 +54,7 @@ def grow(rng, count):
 
     for _ in range(count):
         roots.append(len(cues))
-        add(4)
+        add(5)
     return Trees(
         np.array(roots, np.int32),
         np.array(cues, np.int16),
@@ -70,6 +79,7 @@ def test_learnt_trees_are_well_formed():
     assert grown.roots[0] == 0
     assert grown.cues.max() < COUNT
     assert np.isfinite(grown.limits).all()
+    assert max(np.add.reduceat(~inner, grown.roots)) <= MOST_LEAVES
     # Every node but the roots is the child of exactly one.
     children = np.concatenate([np.flatnonzero(inner) + 1, grown.rights[inner]])
     assert sorted([*children, *grown.roots]) == list(range(len(grown.cues)))
@@ -86,6 +96,10 @@ def test_learnt_trees_are_walked_and_given_up():
     np.testing.assert_allclose(odds, [walk(grown, row) for row in found.astype(np.float32)], atol=1e-9)
     assert (odds < HOPELESS).any()
     assert (odds > HOPELESS).any()
+
+
+def test_every_leaf_has_a_place_of_its_own():
+    assert {int(_hash(np.uint32(1 << leaf))) for leaf in range(MOST_LEAVES)} == set(range(MOST_LEAVES))
 
 
 def test_no_outlines_no_odds():

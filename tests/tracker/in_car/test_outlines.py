@@ -197,11 +197,14 @@ def test_feet_move_pairs_and_change_their_promise(grey, seed):
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 9)), max_size=30), st.integers(1, 4))
 def test_best_keeps_the_most_promising_of_each_row(rated, most):
     pairs = np.zeros((len(rated), 5))
-    pairs[:, 4], pairs[:, 3] = np.array(rated, float).reshape(-1, 2).T
-    kept = own._best(pairs, most)
+    pairs[:, 0] = np.arange(len(rated))
+    pairs[:, 4], pairs[:, 3] = np.array(sorted(rated, key=lambda one: one[0]), float).reshape(-1, 2).T
+    expected = []
     for row in range(4):
-        promises = sorted((promise for number, promise in rated if number == row), reverse=True)
-        assert sorted(kept[kept[:, 4] == row, 3], reverse=True) == promises[:most]
+        # Of equal ones the first.
+        ranked = sorted(pairs[pairs[:, 4] == row].tolist(), key=lambda pair: -pair[3])
+        expected += ranked[:most]
+    assert own._best(pairs, most).tolist() == expected
 
 
 def test_rear_edges_leave_out_the_side_that_is_seen():
@@ -220,6 +223,7 @@ def test_a_drawn_car_is_among_the_outlines(car):
     off = np.abs(found - car).max(1)
     assert off.min() <= max(2.0, 0.05 * (x1 - x0))
     assert len(found) <= own.KEPT * 120
+    assert len(np.unique(found, axis=0)) == len(found)
     assert boxes.shape == (1, 4)
 
 

@@ -17,11 +17,11 @@ def test_sums_are_those_of_the_pixels(grey):
     height, width = grey.shape
     red = redness(grey)
     sums, found = relief_of(grey, red=red).sums, layers(grey, red)
-    assert sums.shape == (height + 1, width + 1, 5)
+    assert sums.shape == (5, height + 1, width + 1)
     for layer in range(5):
         for i in range(height + 1):
             for j in range(width + 1):
-                assert sums[i, j, layer] == found[layer][:i, :j].sum()
+                assert sums[layer, i, j] == found[layer][:i, :j].sum()
 
 
 @settings(max_examples=100, deadline=None)

@@ -12,10 +12,11 @@ from scenarios.loop import run_episode
 from scenarios.score.summary import score
 from tests.tracker.in_car.reliefs import drawn_cars, relief_of
 from tracker import registry
+from tracker.in_car.body import covered
 from tracker.in_car.features import Picture
 from tracker.in_car.outline_odds import learnt_trees
 from tracker.in_car.points import PointStore
-from tracker.in_car.vehicles import INWARD, Vehicle, VehicleStore, covered
+from tracker.in_car.vehicles import HIGHEST, INWARD, LONG, SEARCH, WALK, Vehicle, VehicleStore
 from tracker.in_car.yaw import EgoMotion
 
 RATE = 30.0
@@ -169,6 +170,24 @@ def test_points_join_the_vehicle_they_move_with():
     points.owner[1] = 1
     store._join(points, moving=20.0)
     assert points.owner[1] == 0
+
+
+@pytest.mark.parametrize(
+    ("box", "speed", "sure"),
+    [
+        ((120, 105, 165, 140), 2 * WALK, True),
+        ((120, 105, 165, 140), 0.0, False),
+        ((0, 105, 45, 140), 10, False),
+    ],
+)
+def test_a_whole_one_that_looks_like_a_vehicle_for_long_is_sure(box, speed, sure):
+    grey, _ = drawn_cars([(box[0], box[2], box[3])])
+    relief, store = relief_of(grey, horizon=HORIZON), VehicleStore(rate=RATE, trees=learnt_trees())
+    vehicle = vehicle_at(box, odds=HIGHEST, age=60)
+    for look in range(round(LONG * RATE / SEARCH)):
+        assert not vehicle.confirmed, look
+        store._hold(vehicle, vehicle.box[[0, 2, 3]], vehicle.box[None], np.array([4.0]), 0, relief, speed)
+    assert vehicle.confirmed == sure
 
 
 def test_nothing_is_begun_where_no_point_moves_like_a_vehicle():
