@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 
 WINDOW = 30
 """F: last points of a track that its forecast is made from."""
+STRAIGHT = 0.99
+"""Cosine of the angle between two ways above which the road between them is straight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +87,13 @@ def drift(section: Floats) -> tuple[Floats, Floats]:
     time = np.arange(count) - 0.5 * (count - 1)
     velocity = time @ section / float(time @ time)
     return section.mean(0) + velocity * time[-1], velocity
+
+
+def leads_to(trajectories: Trajectories, track: int, place: Floats) -> bool:
+    """Tell whether a place (2,) lies straight ahead of a track's last points."""
+    section, _ = last_section(trajectories, track, WINDOW)
+    end, velocity = drift(section)
+    return bool(unit(velocity) @ unit(place - end) > STRAIGHT)
 
 
 class LinearForecast:

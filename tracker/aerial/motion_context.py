@@ -40,8 +40,8 @@ class ContextParameters:
         paced: Whether a predictor's clock runs as fast as the predictand went beside it.
         doubt: How many usual errors of a straight line the way of a single predictor must be off it to count;
             several count for more. 0 believes the predictors.
-        journey: Px from one end of a predictor's path to the other at least: what stands and shakes shows nobody
-            the way.
+        journey: Px from one end of a predictor's path to the other at least: what stands and shakes shows
+            nobody the way.
         search_every: Frames between two searches for more predictors.
     """
 
@@ -186,8 +186,11 @@ class ContextForecast:
         self._drop_diverging()
 
     def _onward(self) -> Floats:
-        """Return (2,) the velocity without predictors: where a vehicle goes is known from fewer points than
-        how fast, since a predictor's last ones lag behind where it went under something."""
+        """Return (2,) the velocity without predictors.
+
+        Where a vehicle goes its newest points tell best, but not how fast: those of a predictor that went
+        under something lag behind it.
+        """
         if len(self._section) <= HEADING:
             return self._straight
         speed = float(np.hypot(*drift(self._section)[1]))

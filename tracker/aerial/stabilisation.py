@@ -72,11 +72,11 @@ def inverse(homography: Floats) -> Floats:
     return np.asarray(np.linalg.inv(homography), np.float64)
 
 
-def jacobian(homography: Floats, point: Floats) -> Floats:
-    """Return (2, 2), the derivative of `transform` at a point (2,)."""
-    x, y, w = homography @ np.append(point, 1.0)
-    numerator = homography[:2, :2] * w - np.outer([x, y], homography[2, :2])
-    return np.asarray(numerator / w**2)
+def jacobian(homography: Floats, points: Floats) -> Floats:
+    """Return (..., 2, 2), the derivative of `transform` at points (..., 2)."""
+    homogeneous = points @ homography[:, :2].T + homography[:, 2]
+    shown, w = homogeneous[..., :2, None], homogeneous[..., 2:, None]
+    return np.asarray((homography[:2, :2] * w - shown * homography[2, :2]) / w**2)
 
 
 class Stabiliser:

@@ -8,6 +8,7 @@ place and looks, all at once, before it gets its id.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -15,10 +16,10 @@ from numpy.typing import NDArray
 
 from tracker.aerial import appearance, tracks
 from tracker.aerial.background import Background
-from tracker.aerial.forecasts import WINDOW, Forecaster, drift, last_section, unit
+from tracker.aerial.forecasts import WINDOW, Forecaster, leads_to
 from tracker.aerial.ghosts import contrast
 from tracker.aerial.hidden import HiddenVehicles
-from tracker.aerial.measuring import free_outlines, outline
+from tracker.aerial.measuring import corners, free_outlines, outline
 from tracker.aerial.motion_context import ContextForecast
 from tracker.aerial.reacquisition import Fusion, Matcher
 from tracker.aerial.shadows import CastShadows
@@ -50,9 +51,6 @@ LARGEST = np.array([1.4, 1.5])
 """Length and width of a region, in usual ones, up to which it is one vehicle's."""
 HUGE = np.array([3.5, 2.2])
 """The same of the largest lorry: what is more is the light, or a bridge's edge, or many vehicles."""
-STRAIGHT = 0.99
-"""Cosine of the angle between the way of a vehicle before it was hidden and that from there to where it came
-back, above which the road between is straight."""
 LEAST_HISTORY = 20
 """Frames that a track must have been measured to be forecast once it vanishes."""
 GOES = 8.0
@@ -105,8 +103,7 @@ class AerialTracker:
 
     def _look(self, image: NDArray[np.uint8], to_mosaic: Floats) -> Floats:
         """Measure the tracks, begin new ones; return the boxes (M, 4) of all outlines in the picture."""
-        sure = [_box(track.corners()) for track in self._tracks if track.went()]
-        kept = np.array(sure).reshape(-1, 4)
+        kept = _box(_corners([track for track in self._tracks if track.went()]))
         mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
         blobs = find_blobs(self._shadows.take_off(self._background, mask), LEAST_AREA // 2)
         origin = self._background.origin + np.array(self._background.view[:2])
@@ -247,9 +244,8 @@ class AerialTracker:
         last = self._trajectories.at(old.path, [self._tick])[0]
         share = np.linspace(0.0, 1.0, len(ticks) + 2)[1:-1, None]
         self._hidden.occluders.miss(last + share * (track.origin - last), track.origin - last)
-        before = drift(last_section(self._trajectories, old.path, WINDOW)[0])[1]
-        if unit(before) @ unit(track.origin - last) > STRAIGHT:
-            # Straight on between is where it went.
+        if leads_to(self._trajectories, old.path, track.origin):
+            # Straight on is where it went, and may show others the way.
             track.path = old.path
         track.id = old.id
         track.size = np.maximum(track.size, 0.9 * old.size)
@@ -268,10 +264,10 @@ class AerialTracker:
         if not everyone:
             self._diagnostics = Diagnostics(detections=seen, predictions=None, homography=to_mosaic)
             return Tracks.none()
-        boxes = _boxes(transform(to_picture, np.array([track.corners() for track in everyone])))
-        middles = transform(to_picture, np.array([track.centre for track in everyone]))
-        turns = [jacobian(to_picture, track.centre) for track in everyone]
-        velocity = np.array([turn @ track.velocity for turn, track in zip(turns, everyone, strict=True)])
+        boxes = _boxes(transform(to_picture, _corners(everyone)))
+        centres = np.array([track.centre for track in everyone])
+        middles, turns = transform(to_picture, centres), jacobian(to_picture, centres)
+        velocity = (turns @ np.array([track.velocity for track in everyone])[..., None])[..., 0]
         status = [_status(track) for track in everyone]
         unseen = [k for k, track in enumerate(everyone) if status[k] == Status.COASTING]
         covariances = [
@@ -305,6 +301,13 @@ def _status(track: Track) -> Status:
     if not track.confirmed:
         return Status.TENTATIVE
     return Status.COASTING if track.misses or track.forecast is not None else Status.CONFIRMED
+
+
+def _corners(vehicles: Sequence[Track]) -> Floats:
+    """Return (N, 4, 2) of their rectangles in the mosaic."""
+    places = [(*track.centre, *track.heading, *track.size) for track in vehicles]
+    centres, headings, sizes = np.array(places).reshape(-1, 3, 2).swapaxes(0, 1)
+    return corners(centres, headings, sizes)
 
 
 def _box(points: Floats) -> Floats:

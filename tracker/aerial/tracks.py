@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tracker.aerial import appearance
 from tracker.aerial.forecasts import Forecast
-from tracker.aerial.measuring import Outlines, corners
+from tracker.aerial.measuring import Outlines
 from tracker.filtering import kalman
 from tracker.filtering.assignment import assign
 
@@ -52,8 +52,8 @@ class Track:
 
     Attributes:
         id: >= 1.
-        path: Key in `Trajectories` of where it went since it came into view, for the first time or again: what
-            lies between is guessed, and shows nobody the way.
+        path: Key in `Trajectories` of where it went since it came into view, for the first time or again:
+            what lies between is guessed, and shows nobody the way.
         state: (2, 2) x, vx; y, vy, px of the mosaic and px a frame.
         spread: (2, 2, 2) covariance of each axis.
         heading: (2,) unit vector.
@@ -101,10 +101,6 @@ class Track:
     def went(self, lengths: float = 2.0) -> bool:
         """Tell whether it is so many of its lengths away from where it began."""
         return float(np.hypot(*(self.centre - self.origin))) > lengths * float(self.size[0])
-
-    def corners(self) -> Floats:
-        """(4, 2) of its rectangle in the mosaic."""
-        return np.asarray(corners(self.centre[None], self.heading[None], self.size[None])[0])
 
 
 def begin(number: int, outlines: Outlines, k: int, tick: int) -> Track:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tracker.aerial import lyapunov
 from tracker.aerial.calibration import Calibration, quantile, scale
-from tracker.aerial.forecasts import Growth, KalmanForecast, LinearForecast
+from tracker.aerial.forecasts import Growth, KalmanForecast, LinearForecast, leads_to
 from tracker.aerial.motion_context import PRINTED, ContextForecast, ContextParameters
 from tracker.aerial.regression import affine, carry, similarity
 from tracker.aerial.trajectories import Trajectories
@@ -216,6 +216,49 @@ def test_predictors_that_end_or_leave_are_dropped():
         if tick == 90:
             assert held == {1, 2, 3}
     assert np.isfinite(forecast.point).all()
+
+
+def test_what_stands_and_shakes_shows_nobody_the_way():
+    rng = np.random.default_rng(3)
+    known = Trajectories()
+    for tick in range(120):
+        # What has moved a little, and then stands.
+        known.append(1, tick, rng.normal([100.0 + min(1.2 * tick, 40.0), 4.0], 0.3))
+        known.append(9, tick, rng.normal([1.2 * (tick - 120) + 120.0, 0.0], 0.3))
+    trusting = ContextForecast(known, 9, parameters=ContextParameters(journey=0.0))
+    forecast = ContextForecast(known, 9)
+    for tick in range(120, 180):
+        trusting.step(tick)
+        forecast.step(tick)
+    truth = np.array([1.2 * 59 + 120.0, 0.0])
+    assert np.hypot(*(forecast.point - truth)) < 6.0
+    assert np.hypot(*(trusting.point - truth)) > 10.0
+
+
+def test_the_last_points_of_a_predictor_tell_nothing_of_the_speed():
+    known = Trajectories()
+    for track, lag in ((1, 50), (2, 60), (3, 70)):
+        for tick in range(-60, 60):
+            # They vanish under something front first, so that their middles seem to stop.
+            ahead = min(tick + lag, 100) + 0.3 * np.clip(tick + lag - 100, 0, 6)
+            if tick + lag <= 106:
+                known.append(track, tick, [3.0 * ahead, 13.0 * track])
+    for tick in range(40):
+        known.append(9, tick, [3.0 * tick, 0.0])
+    forecast = ContextForecast(known, 9)
+    assert len(forecast.guides) == 3
+    forecast.step(160)
+    assert forecast.guides == []
+    assert abs(forecast.point[0] - 3.0 * 160) < 45.0
+
+
+def test_a_place_straight_ahead():
+    known = Trajectories()
+    for tick in range(40):
+        known.append(1, tick, [3.0 * tick, 2.0 * tick])
+    assert leads_to(known, 1, np.array([300.0, 200.0]))
+    assert not leads_to(known, 1, np.array([300.0, 300.0]))
+    assert not leads_to(known, 1, np.array([0.0, 0.0]))
 
 
 def test_without_predictors_it_goes_straight_on():

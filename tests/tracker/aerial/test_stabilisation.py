@@ -105,4 +105,5 @@ def test_the_jacobian_is_the_derivative():
         at = transform(homography, near)
         numeric = np.column_stack([at[0] - at[1], at[2] - at[3]]) / (2 * step)
         assert np.allclose(jacobian(homography, point), numeric, rtol=1e-4, atol=1e-6)
+        assert np.allclose(jacobian(homography, near), [jacobian(homography, one) for one in near])
         assert np.allclose(transform(inverse(homography), transform(homography, point)), point)
