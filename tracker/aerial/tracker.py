@@ -33,6 +33,8 @@ LEAST_AREA = 30
 """Smallest region that begins a track, px."""
 BORDER = 3.0
 """Px from the picture's border within which an outline is cut off."""
+RIM = 0.8
+"""Px by which foreground is longer and wider than what casts it: blur carries it over the ground."""
 MOVED = 0.5
 """Lengths, its own or usual ones, that a track must have gone to be confirmed: what only seems to move
 does not go far."""
@@ -264,7 +266,7 @@ class AerialTracker:
         if not everyone:
             self._diagnostics = Diagnostics(detections=seen, predictions=None, homography=to_mosaic)
             return Tracks.none()
-        boxes = _boxes(transform(to_picture, _corners(everyone)))
+        boxes = _boxes(transform(to_picture, _corners(everyone, -RIM)))
         centres = np.array([track.centre for track in everyone])
         middles, turns = transform(to_picture, centres), jacobian(to_picture, centres)
         velocity = (turns @ np.array([track.velocity for track in everyone])[..., None])[..., 0]
@@ -303,11 +305,11 @@ def _status(track: Track) -> Status:
     return Status.COASTING if track.misses or track.forecast is not None else Status.CONFIRMED
 
 
-def _corners(vehicles: Sequence[Track]) -> Floats:
-    """Return (N, 4, 2) of their rectangles in the mosaic."""
+def _corners(vehicles: Sequence[Track], wider: float = 0.0) -> Floats:
+    """Return (N, 4, 2) of their rectangles in the mosaic, made wider and longer by so many px."""
     places = [(*track.centre, *track.heading, *track.size) for track in vehicles]
     centres, headings, sizes = np.array(places).reshape(-1, 3, 2).swapaxes(0, 1)
-    return corners(centres, headings, sizes)
+    return corners(centres, headings, np.maximum(sizes + wider, 1.0))
 
 
 def _box(points: Floats) -> Floats:
