@@ -196,7 +196,26 @@ def _diagnostic_faults(diagnostics: object) -> list[str]:
     """List what is wrong with the inner state that a tracker shows."""
     if not isinstance(diagnostics, Diagnostics):
         return [f"diagnostics: a {type(diagnostics).__name__}, wanted tracker.types.Diagnostics"]
-    traces: Traces | None = diagnostics.traces
+    return [*_association_faults(diagnostics), *_trace_faults(diagnostics.traces)]
+
+
+def _association_faults(diagnostics: Diagnostics) -> list[str]:
+    if diagnostics.association is None:
+        return []
+    if diagnostics.detections is None:
+        return ["association: without detections"]
+    ids, beta = diagnostics.association.ids, diagnostics.association.beta
+    shape = (len(ids), len(diagnostics.detections) + 1)
+    faults = [
+        *_array_faults("association.ids", ids, shape[:1], np.int64),
+        *_array_faults("association.beta", beta, shape, np.float64),
+    ]
+    if not faults and not np.allclose(beta.sum(1), 1.0, atol=1e-6):
+        faults.append("association.beta: rows do not sum to 1")
+    return faults
+
+
+def _trace_faults(traces: Traces | None) -> list[str]:
     if traces is None:
         return []
     count, points = len(traces.ids), len(traces.points)

@@ -9,7 +9,7 @@ import pytest
 
 from tracker.base import ContractError, check_tracker
 from tracker.registry import TRACKERS, make
-from tracker.types import Frame, Info, Tracks
+from tracker.types import Association, Diagnostics, Frame, Info, Tracks
 
 
 class Fixed:
@@ -90,6 +90,22 @@ class Rewriter(Fixed):
         return self.last
 
 
+class Unshown(Fixed):
+    """Shows probabilities of more detections than it shows."""
+
+    columns, own = 3, 0.5
+
+    @property
+    def diagnostics(self):
+        beta = np.full((1, self.columns), self.own)
+        association = Association(ids=np.array([1]), beta=beta)
+        return Diagnostics(detections=np.array([[0.0, 0.0, 5.0, 5.0]]), association=association)
+
+
+class Uneven(Unshown):
+    columns, own = 2, 0.6
+
+
 class Listing(Fixed):
     def step(self, _frame):
         return [1]
@@ -117,6 +133,8 @@ def test_a_tracker_that_keeps_the_contract_passes():
         (Forgetless, "start must reset everything"),
         (Painter, "writes into the frame's image"),
         (Rewriter, "what was returned is final"),
+        (Unshown, r"association.beta: shape \(1, 3\), wanted \(1, 2\)"),
+        (Uneven, "association.beta: rows do not sum to 1"),
         (Listing, "returns a list"),
         (Raising, "no scenario given"),
     ],

@@ -57,7 +57,12 @@ class MotorcycleLaneTracker(EpisodeTracker):
         joined = np.zeros(len(tracks), np.bool_)
         joined[at] = seen.joined
         store.update(seen, joined)
-        association = Association(ids=predictions.ids, beta=store.beta) if len(predictions.ids) else None
+        association = None
+        if len(predictions.ids):
+            # Who is where nothing is detected is missed.
+            own = store.beta[:, 1:][:, store.believed]
+            missed = 1.0 - own.sum(1, keepdims=True)
+            association = Association(ids=predictions.ids, beta=np.concatenate([missed, own], 1))
         tracks = store.tracks
         status = store.status()
         gone = (status == Status.CONFIRMED) & tracks.moved(1.0)

@@ -100,6 +100,16 @@ def test_few_boxes_are_false(followed):
     assert false < 0.03 * total
 
 
+def test_each_detection_has_its_probabilities(followed):
+    shown = [diagnostics for _, diagnostics in followed if diagnostics.association is not None]
+    assert shown
+    for diagnostics in shown:
+        beta = diagnostics.association.beta
+        assert beta.shape == (len(diagnostics.association.ids), len(diagnostics.detections) + 1)
+        assert beta.sum(1) == pytest.approx(np.ones(len(beta)))
+        assert (beta >= -1e-12).all()
+
+
 def test_the_wrong_way_rider_is_flagged_and_nobody_else(video, followed):
     ids = ids_of(5, video, followed)
     own = np.bincount(ids[ids > 0]).argmax()
