@@ -23,7 +23,7 @@ AGREED = 0.6
 """Length of the others' mean direction, 1 if all go the same way, from which it is one."""
 SURE_SECONDS = 0.3
 """How much longer a track must have been seen against the others than with them."""
-WAY = 2.0
+WAY = 1.25
 """Rider heights that it must have gone meanwhile, as it goes: one that jumps to another rider goes less."""
 
 
