@@ -74,7 +74,8 @@ class Flow:
         began = np.array([self._since.get(i, place) for i, place in zip(ids.tolist(), places, strict=True)])
         way = ((places - began.reshape(-1, 2)) * directions).sum(1)
         sure = np.array([self._against[i] >= self._limit for i in ids.tolist()], np.bool_)
-        return np.asarray(ids[sure & (way > WAY * heights)])
+        # Who turned back with the others has gone none against them.
+        return np.asarray(ids[sure & (verdict >= 0) & (way > WAY * heights)])
 
     def _verdict(self, ids: NDArray[np.int64], places: Floats, directions: Floats) -> NDArray[np.int64]:
         """Return (N,) 1 for a direction against the others', -1 for one with it, 0 where they say nothing."""
