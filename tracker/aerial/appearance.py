@@ -102,16 +102,18 @@ def pool(groups: list[Floats]) -> Floats:
     return np.asarray((2.0 * squares + BELIEF * usual) / (count + BELIEF))
 
 
-def log_ratios(pictures: Floats, hidden: list[Floats]) -> Floats:
+def log_ratios(pictures: Floats, hidden: list[Floats], worth: float) -> Floats:
     """Weigh new vehicles against hidden ones by their looks.
 
     Args:
         pictures: (M, D), of each new vehicle one.
         hidden: N arrays (L, D) of what the hidden vehicles looked like.
+        worth: Independent dimensions that a picture is worth.
 
     Returns:
-        (N, M) the log density of the differences to hidden vehicle i if the new one is i, less the greatest
-        if it is another of the hidden, or one that looks like no one in particular; a dimension each.
+        (N, M) the log density of the differences to hidden vehicle i if the new one is i, less that if it is
+        anybody else: like one of the other hidden, all as likely, or like no one in particular; a dimension
+        each. Among vehicles that all look alike looks say nothing.
     """
     if not hidden or not len(pictures):
         return np.zeros((len(hidden), len(pictures)))
@@ -130,7 +132,9 @@ def log_ratios(pictures: Floats, hidden: list[Floats]) -> Floats:
             between = 0.5 * (variances + variances[i])
             others = -0.5 * (squares / between + np.log(2.0 * np.pi * between)).mean(1)
             others[i] = unlike
-            ratios[i, j] = np.median(own.log_density(picture - group)) - others.max()
+            most = others.max()
+            anybody = most + np.log(np.exp(worth * (others - most)).mean()) / worth
+            ratios[i, j] = np.median(own.log_density(picture - group)) - anybody
     return ratios
 
 

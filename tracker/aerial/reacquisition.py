@@ -84,7 +84,7 @@ class Fusion:
             ratios += hidden.densities - np.log(new.strangers)
         if self.looks:
             near = np.flatnonzero((squared <= self.gate).any(1))
-            looks = appearance.log_ratios(new.pictures, [hidden.pictures[i] for i in near])
+            looks = appearance.log_ratios(new.pictures, [hidden.pictures[i] for i in near], self.looks)
             ratios[near] += np.clip(self.looks * looks, -self.most, self.most)
         return best(np.where(squared <= self.gate, ratios, -np.inf), self.least)
 

@@ -66,11 +66,20 @@ def test_looks_tell_hidden_vehicles_apart():
     rng = np.random.default_rng(0)
     hidden = [_vehicle(rng) for _ in range(3)]
     new = np.array([group.mean(0) + rng.normal(0, 6.0, DIMENSIONS) for group in hidden] + [_vehicle(rng)[0]])
-    ratios = appearance.log_ratios(new, hidden)
+    ratios = appearance.log_ratios(new, hidden, 8.0)
     assert (ratios[range(3), range(3)] > 0).all()
     ratios[range(3), range(3)] = -1.0
     assert (ratios < 0).all()
-    assert appearance.log_ratios(new, []).shape == (0, 4)
+    assert appearance.log_ratios(new, [], 8.0).shape == (0, 4)
+
+
+def test_looks_say_nothing_among_lookalikes():
+    rng = np.random.default_rng(1)
+    one = _vehicle(rng).mean(0)
+    hidden = [one + rng.normal(0, 5.0, (6, DIMENSIONS)) for _ in range(12)]
+    ratios = appearance.log_ratios(one + rng.normal(0, 5.0, (4, DIMENSIONS)), hidden, 8.0)
+    # Each of twelve alike looks as much like the new one as anybody.
+    assert np.abs(8.0 * ratios).max() < 1.0
 
 
 def test_a_patch_follows_the_heading():
