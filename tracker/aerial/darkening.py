@@ -14,6 +14,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.motorcycle_lane.blobs import find_blobs
+
 Floats = NDArray[np.float64]
 
 REACH = 1
@@ -122,7 +124,7 @@ class Shadows:
             mask: (H, W) raw foreground.
         """
         at = np.nonzero(mask)
-        _, labels = cv2.connectedComponents(mask.view(np.uint8))
+        labels = find_blobs(mask, 1).labels
         ratios, tints, spread = darkness(image, background, mask)[at].T
         likely = (ratios > 0.0) & (spread < UNEVEN)
         away = _from_middles(labels, at)[:, likely]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -84,9 +85,16 @@ def drift(section: Floats) -> tuple[Floats, Floats]:
     count = len(section)
     if count < 2:
         return section[-1].copy(), np.zeros(2)
+    end, slope = line(count)
+    return end @ section, slope @ section
+
+
+@functools.cache
+def line(count: int) -> tuple[Floats, Floats]:
+    """Return the weights (K,) of K successive points in the end and the slope of the line through them."""
     time = np.arange(count) - 0.5 * (count - 1)
-    velocity = time @ section / float(time @ time)
-    return section.mean(0) + velocity * time[-1], velocity
+    slope: Floats = time / float(time @ time)
+    return np.asarray(1.0 / count + time[-1] * slope), slope
 
 
 def leads_to(trajectories: Trajectories, track: int, place: Floats) -> bool:

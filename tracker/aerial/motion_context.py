@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.aerial import lyapunov
-from tracker.aerial.forecasts import WINDOW, Growth, drift, last_section, unit
+from tracker.aerial.forecasts import WINDOW, Growth, drift, last_section, line, unit
 from tracker.aerial.regression import carry
 from tracker.aerial.trajectories import Trajectories
 
@@ -85,7 +85,7 @@ SAME_WAY = 0.9
 ANCHOR = 9
 """Points through which a line gives the last seen position."""
 BACK = np.arange(1.0 - ANCHOR, 1.0)
-TO_END: Floats = 1.0 / ANCHOR + (BACK - BACK.mean()) * BACK.mean() / -((BACK - BACK.mean()) ** 2).sum()
+TO_END: Floats = line(ANCHOR)[0]
 """Weights of points ``BACK`` frames ago in the last point of the line through them."""
 HEADING = 15
 """Last points that tell where a vehicle goes."""

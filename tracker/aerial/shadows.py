@@ -69,13 +69,14 @@ class CastShadows:
             self._learn(mask, lit)
         vehicles = along(filled(mask), self.offset) | lit
         lit = _as_mask(cv2.morphologyEx(lit.view(np.uint8), cv2.MORPH_CLOSE, GRAIN))
-        labels = find_blobs(vehicles, SMALLEST).labels
-        areas = np.bincount(labels.ravel())
-        self._areas.extend(areas[1:].tolist())
-        large = areas > LARGE * np.median(self._areas or [np.inf])
-        joined = large & (np.bincount(labels[lit], minlength=len(areas)) > LIT * areas)
-        joined[0] = False
-        return np.where(joined[labels], filled(lit), vehicles)
+        blobs = find_blobs(vehicles, SMALLEST)
+        self._areas.extend(blobs.areas.tolist())
+        large = blobs.areas > LARGE * np.median(self._areas or [np.inf])
+        light = np.bincount(blobs.labels[lit], minlength=len(blobs) + 1)[1:]
+        joined = np.append(False, large & (light > LIT * blobs.areas))
+        if not joined.any():
+            return vehicles
+        return np.where(joined[blobs.labels], filled(lit), vehicles)
 
     def _learn(self, mask: Mask, lit: Mask) -> None:
         """Learn from regions of which a part is lit: how much farther the whole reaches to each side."""
