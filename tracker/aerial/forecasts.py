@@ -92,8 +92,8 @@ def drift(section: Floats) -> tuple[Floats, Floats]:
 @functools.cache
 def line(count: int) -> tuple[Floats, Floats]:
     """Return the weights (K,) of K successive points in the end and the slope of the line through them."""
-    time = np.arange(count) - 0.5 * (count - 1)
-    slope: Floats = time / float(time @ time)
+    time = np.linspace(-0.5, 0.5, count) * (count - 1)
+    slope = np.asarray(time / (time @ time))
     return np.asarray(1.0 / count + time[-1] * slope), slope
 
 
