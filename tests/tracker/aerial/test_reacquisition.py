@@ -73,13 +73,15 @@ def test_looks_tell_hidden_vehicles_apart():
     assert appearance.log_ratios(new, [], 8.0).shape == (0, 4)
 
 
-def test_looks_say_nothing_among_lookalikes():
+def test_looks_say_nothing_among_lookalikes_and_speak_for_both_of_two():
     rng = np.random.default_rng(1)
     one = _vehicle(rng).mean(0)
-    hidden = [one + rng.normal(0, 5.0, (6, DIMENSIONS)) for _ in range(12)]
-    ratios = appearance.log_ratios(one + rng.normal(0, 5.0, (4, DIMENSIONS)), hidden, 8.0)
-    # Each of twelve alike looks as much like the new one as anybody.
-    assert np.abs(8.0 * ratios).max() < 1.0
+    alike = [one + rng.normal(0, 5.0, (6, DIMENSIONS)) for _ in range(12)]
+    new = one + rng.normal(0, 5.0, (4, DIMENSIONS))
+    assert np.abs(8.0 * appearance.log_ratios(new, alike, 8.0)).max() < 1.0
+    # Whom the other one looks like matters little where most look like neither.
+    mixed = alike[:2] + [_vehicle(rng) for _ in range(10)]
+    assert 8.0 * appearance.log_ratios(new, mixed, 8.0)[:2].min() > 1.0
 
 
 def test_a_patch_follows_the_heading():

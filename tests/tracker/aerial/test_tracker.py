@@ -89,6 +89,29 @@ def test_who_passes_under_a_bridge_gets_its_id_back(frames):
     assert after[0] == [number for number in before[0] if number in after[0]]
 
 
+@pytest.mark.parametrize("straight", [True, False])
+def test_a_path_goes_on_through_a_gap_where_the_road_is_straight(frames, monkeypatch, straight):
+    if not straight:
+        monkeypatch.setattr("tracker.aerial.tracker.leads_to", lambda *_: False)
+    tracker = AerialTracker()
+    _, after = ids_in_lanes(tracker, frames)
+    back = {number for numbers in after.values() for number in numbers}
+    again = [track for track in tracker._tracks if track.id in back]
+    assert len(again) >= 3
+    assert all((track.path == track.id) == straight for track in again)
+
+
+def test_boxes_are_as_large_as_vehicles_though_blur_widens_what_is_seen(frames):
+    tracker, sizes = AerialTracker(), []
+    tracker.start(INFO)
+    for k, image in enumerate(frames[:80]):
+        blurred = cv2.GaussianBlur(image, (5, 5), 1.2)
+        tracks = tracker.step(Frame(image=blurred, tick=k, time=k / 30.0))
+        boxes = tracks.boxes[tracks.status == Status.CONFIRMED]
+        sizes.extend(boxes[:, 2:] - boxes[:, :2])
+    assert np.abs(np.median(sizes, 0) - [22.0, 10.0]).max() < 1.2, np.median(sizes, 0)
+
+
 def test_without_re_acquisition_they_are_new(frames):
     before, after = ids_in_lanes(AerialTracker(matcher=Fusion(least=np.inf)), frames)
     assert after
