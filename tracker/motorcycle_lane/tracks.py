@@ -45,8 +45,8 @@ GONE, NEVER_CAME = 0.002, 0.05
 SMALLEST_HEIGHT = 14.0
 """Height that a smaller track is taken to have when its way is judged, px: specks jump by their own size."""
 STILL = 0.15
-"""Rider heights a second below which a track stands. In a rush hour riders go a third of their height a second,
-and of those who ride it must not be thought that they were left of the training."""
+"""Rider heights a second below which a track stands. In a rush hour riders go a third of their height a
+second, and none of those who ride must be taken for what was left of the training."""
 PARKED, GHOST = 3.0, 0.5
 """Seconds of standing after which a rider is parked; and after which what has never gone a rider's height is
 what was left of the training's traffic in the background."""
