@@ -17,7 +17,7 @@ from tracker.motorcycle_lane.sizes import SMALLEST
 Floats = NDArray[np.float64]
 
 ROWS, COLUMNS = 24, 12
-ON_BACKGROUND = 1.0
+ON_BACKGROUND = 1.3
 """What a pixel of background costs that a silhouette covers; one of foreground gains 1."""
 COLOUR = 0.35
 """Weight of a visible pixel's log likelihood ratio of colour."""
