@@ -37,8 +37,8 @@ class GlRenderer:
     """Draws the world of one stage.
 
     A frame is one pass over the geometry, with one sample at each pixel's centre, that writes colour,
-    identity and depth. Shadows are a mask that only the colour of the ground and of bridges reads, the sky and the glare of
-    lamps are colour alone, and the stairs along edges are smoothed afterwards.
+    identity and depth. Shadows are a mask that only the colours of the ground and of bridges read, the sky
+    and the glare of lamps are colour alone, and the stairs along edges are smoothed afterwards.
 
     Args:
         stage: What stands still.
