@@ -30,7 +30,6 @@ UNEVEN = 0.12
 """Greatest relative standard deviation of the ratio in the window."""
 BINS = (26, 18)
 """Of darkness and tint."""
-GRAIN = np.ones((3, 3), np.uint8)
 NOISE = 8.0
 """Grey levels by which a shadow may be off the range of its neighbours."""
 EDGE = 7
@@ -116,7 +115,11 @@ class Shadows:
         self._pull = np.zeros((2, *BINS))
 
     def remove(
-        self, image: NDArray[np.uint8], background: NDArray[np.uint8], mask: NDArray[np.bool_]
+        self,
+        image: NDArray[np.uint8],
+        background: NDArray[np.uint8],
+        mask: NDArray[np.bool_],
+        bounds: tuple[NDArray[np.float32], NDArray[np.float32]],
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return (H, W) the foreground without shadows, and what of it is a vehicle for sure.
 
@@ -126,6 +129,8 @@ class Shadows:
             image: (H, W, 3) RGB.
             background: (H, W, 3) RGB, the background image.
             mask: (H, W) raw foreground.
+            bounds: (H, W, 3) each, the least and the most of the background about each pixel: lines and other
+                edges of the ground never lie quite still.
         """
         at = np.nonzero(mask)
         labels = find_blobs(mask, 1).labels
@@ -148,9 +153,8 @@ class Shadows:
         sure[at] = dim & likely
         # At its edges the window reaches beyond a shadow.
         near = cv2.dilate(sure, np.ones((EDGE, EDGE), np.uint8))
-        # Lines and other edges of the ground never lie quite still.
         share = dark * np.array([1.0 - 0.5 * tint, 1.0, 1.0 + 0.5 * tint])
-        low, high = (share * change(background, GRAIN)[at] for change in (cv2.erode, cv2.dilate))
+        low, high = (share * bound[at] for bound in bounds)
         ranged = ((image[at] >= low - NOISE) & (image[at] <= high + NOISE)).all(1)
         left = mask.copy()
         left[at] = ~((dim | ranged) & (near[at] > 0))
