@@ -37,8 +37,8 @@ class GlRenderer:
     """Draws the world of one stage.
 
     A frame is one pass over the geometry, with one sample at each pixel's centre, that writes colour,
-    identity and depth. Shadows are a mask that only the ground's colour reads, the sky and the glare of
-    lamps are colour alone, and the stairs along edges are smoothed afterwards.
+    identity and depth. Shadows are a mask that only the colours of the ground and of bridges read, the sky
+    and the glare of lamps are colour alone, and the stairs along edges are smoothed afterwards.
 
     Args:
         stage: What stands still.
@@ -169,7 +169,8 @@ class GlRenderer:
         sun = self._stage.light.sun
         if sun[2] <= 0.05 or not self._stage.light.sun_colour.any():
             return
-        ctx.enable_only(ctx.NOTHING)
+        ctx.enable_only(ctx.BLEND)
+        ctx.blend_func = ctx.ONE, ctx.ONE
         set_uniforms(self._body_shadow, **view, u_sun=tuple(sun), u_ground=-float(pose.position[2]))
         self._body_shadow_array.render_indirect(self._caster_commands, count=draws)
 
@@ -279,7 +280,7 @@ class GlRenderer:
         )
         self._target = keep(ctx.framebuffer([colour, ids, distances], depth))
         self._over = keep(ctx.framebuffer([colour], depth))
-        self._mask_texture = keep(ctx.texture(size, 1))
+        self._mask_texture = keep(ctx.texture(size, 2))
         self._mask_texture.repeat_x = self._mask_texture.repeat_y = False
         self._mask = keep(ctx.framebuffer([self._mask_texture]))
 

@@ -150,6 +150,26 @@ def test_the_sun_casts_shadows_on_the_ground():
     assert with_car.colour[row, column].sum() < 0.8 * without.colour[row, column].sum()
 
 
+def test_what_drives_on_a_bridge_casts_its_shadow_there():
+    # Of the stage's bridge the deck lies 7 m up; the shadow of a car on it falls to the right and ahead.
+    above = Pose.looking((60.0, 0.0, 30.0), yaw=0.0, pitch=-np.pi / 2)
+    on_deck = bodies([(0, 60.0, 0.0, 0.0)], FIRST_VEHICLE_ID)
+    on_deck = replace(on_deck, positions=np.array([[60.0, 0.0, 7.0]]))
+    below = bodies([(0, 60.0, 0.0, 0.0)], FIRST_VEHICLE_ID)
+    none = bodies([], FIRST_VEHICLE_ID)
+    with GlRenderer(stage(), CAMERA) as sunny:
+        upon, under, empty = (
+            sunny.render(replace(state(), vehicles=vehicles), CAMERA, above).colour.astype(int)
+            for vehicles in (on_deck, below, none)
+        )
+    (pixel, lit), _ = project(CAMERA, above, [[60.4, -1.3, 7.0], [60.0, 1.5, 7.0]])
+    row, column = int(pixel[1]), int(pixel[0])
+    assert upon[row, column].sum() < 0.8 * empty[row, column].sum()
+    np.testing.assert_array_equal(upon[int(lit[1]), int(lit[0])], empty[int(lit[1]), int(lit[0])])
+    # That of a car below does not show through.
+    np.testing.assert_array_equal(under[row, column], empty[row, column])
+
+
 def test_codes_keep_24_bits():
     for code in (1, 255, 256, 65_535, 65_536, 1 << 23):
         red, green, blue = code_colour(code)

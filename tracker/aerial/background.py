@@ -40,6 +40,8 @@ class Background:
         view: (x0, y0, x1, y1) of the last picture in the window.
         laid: (h, w, 3) the last picture in the mosaic, cut to ``view``.
         valid: (h, w) where it has anything.
+        low: (h, w, 3) the darkest of the background about each pixel of the view.
+        high: Likewise the brightest.
     """
 
     def __init__(self) -> None:
@@ -81,13 +83,14 @@ class Background:
             protected[max(box[1], 0) : max(box[3], 0), max(box[0], 0) : max(box[2], 0)] = True
         part = np.s_[y0:y1, x0:x1]
         mean = np.ascontiguousarray(self._mean[part])
+        self.low, self.high = cv2.erode(mean, NEIGHBOURS), cv2.dilate(mean, NEIGHBOURS)
         return np.asarray(
             _compare(
                 self.laid,
                 self.valid,
                 protected,
-                cv2.erode(mean, NEIGHBOURS),
-                cv2.dilate(mean, NEIGHBOURS),
+                self.low,
+                self.high,
                 self._mean[part],
                 self._spread[part],
                 self._support[part],

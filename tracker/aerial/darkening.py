@@ -30,9 +30,13 @@ UNEVEN = 0.12
 """Greatest relative standard deviation of the ratio in the window."""
 BINS = (26, 18)
 """Of darkness and tint."""
+NOISE = 8.0
+"""Grey levels by which a shadow may be off the range of its neighbours."""
 EDGE = 7
 """Side of the neighbourhood, px, in which a shadow may be uneven."""
 FADING = 0.98
+BRIGHTER, BLACKER, COLOURED = 1.15, 0.2, 0.15
+"""Ratio to the background, ratio below that of shadows, and excess of green, that shadows never have."""
 DARKER, OFF_TINT = 0.1, 0.12
 """How much darker than the learnt one a shadow may be, and how far off its tint; its rim is brighter."""
 
@@ -47,11 +51,11 @@ def darkness(image, background, mask):  # type: ignore[no-untyped-def]
         mask: (H, W) bool, foreground.
 
     Returns:
-        (H, W, 3) float32: the ratio to the background, 0 where it is no shadow's; its tint; and its relative
-        standard deviation in the window.
+        (H, W, 4) float32, 0 outside: of a window's ratio to the background its mean, tint, excess of green,
+        and relative standard deviation.
     """
     height, width = mask.shape
-    found = np.zeros((height, width, 3), np.float32)
+    found = np.zeros((height, width, 4), np.float32)
     for y in range(height):
         for x in range(width):
             if not mask[y, x]:
@@ -74,15 +78,12 @@ def darkness(image, background, mask):  # type: ignore[no-untyped-def]
                     first += ratio
                     second += ratio * ratio
                     count += 1
-            mean = (now0 + now1 + now2) / (then0 + then1 + then2 + 1.0)
-            if mean < DARKEST or mean > BRIGHTEST:
-                continue
+            mean = (now0 + now1 + now2 + 1.0) / (then0 + then1 + then2 + 1.0)
             red, green, blue = now0 / (then0 + 1.0), now1 / (then1 + 1.0), now2 / (then2 + 1.0)
             tint = (blue - red) / mean
             first /= count
             spread = np.sqrt(max(second / count - first * first, 0.0)) / mean
-            if REDDEST < tint < BLUEST and abs(green - 0.5 * (red + blue)) <= GREENEST * mean:
-                found[y, x] = mean, tint, spread
+            found[y, x] = mean, tint, (green - 0.5 * (red + blue)) / mean, spread
     return found
 
 
@@ -114,34 +115,54 @@ class Shadows:
         self._pull = np.zeros((2, *BINS))
 
     def remove(
-        self, image: NDArray[np.uint8], background: NDArray[np.uint8], mask: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
-        """Return (H, W) the foreground without shadows, and learn how dark these are.
+        self,
+        image: NDArray[np.uint8],
+        background: NDArray[np.uint8],
+        mask: NDArray[np.bool_],
+        bounds: tuple[NDArray[np.float32], NDArray[np.float32]],
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return (H, W) the foreground without shadows, and what of it is a vehicle for sure.
+
+        How dark shadows are is learnt.
 
         Args:
             image: (H, W, 3) RGB.
             background: (H, W, 3) RGB, the background image.
             mask: (H, W) raw foreground.
+            bounds: (H, W, 3) each, the least and the most of the background about each pixel: lines and other
+                edges of the ground never lie quite still.
         """
         at = np.nonzero(mask)
         labels = find_blobs(mask, 1).labels
-        ratios, tints, spread = darkness(image, background, mask)[at].T
-        likely = (ratios > 0.0) & (spread < UNEVEN)
+        ratios, tints, greens, spread = darkness(image, background, mask)[at].T
+        grey = (ratios > DARKEST) & (ratios < BRIGHTEST) & (tints > REDDEST) & (tints < BLUEST)
+        grey &= np.abs(greens) <= GREENEST
+        likely = grey & (spread < UNEVEN)
         away = _from_middles(labels, at)[:, likely]
         self._pull = FADING * self._pull + _pull(ratios[likely], tints[likely], away)
         if not self._pull.any():
-            return mask
+            return mask, mask
         smooth = [cv2.blur(part, (3, 3), borderType=cv2.BORDER_CONSTANT) for part in self._pull]
         i, j = np.unravel_index(np.hypot(*smooth).argmax(), BINS)
         dark = DARKEST + (i + 0.5) / BINS[0] * (BRIGHTEST - DARKEST)
         tint = REDDEST + (j + 0.5) / BINS[1] * (BLUEST - REDDEST)
         # A rim has less of both: a part of the sun still shines there.
         expected = tint * (1.0 - ratios) / (1.0 - dark)
-        dim = (ratios > dark - DARKER) & (np.abs(tints - expected) < OFF_TINT)
+        dim = grey & (ratios > dark - DARKER) & (np.abs(tints - expected) < OFF_TINT)
         sure = np.zeros(mask.shape, np.uint8)
         sure[at] = dim & likely
         # At its edges the window reaches beyond a shadow.
         near = cv2.dilate(sure, np.ones((EDGE, EDGE), np.uint8))
+        share = dark * np.array([1.0 - 0.5 * tint, 1.0, 1.0 + 0.5 * tint])
+        low, high = (share * bound[at] for bound in bounds)
+        ranged = ((image[at] >= low - NOISE) & (image[at] <= high + NOISE)).all(1)
         left = mask.copy()
-        left[at] = ~(dim & (near[at] > 0))
-        return left
+        left[at] = ~((dim | ranged) & (near[at] > 0))
+        own = left.copy()
+        own[at] &= (
+            (ratios > BRIGHTER)
+            | (ratios < dark - BLACKER)
+            | (np.abs(greens) > COLOURED)
+            | (np.abs(tints - expected) > 2.0 * COLOURED)
+        )
+        return left, own

@@ -191,7 +191,7 @@ class ContextForecast:
         Where a vehicle goes its newest points tell best, but not how fast: those of a predictor that went
         under something lag behind it.
         """
-        if len(self._section) <= HEADING:
+        if len(self._section) <= HEADING or not self._witnesses:
             return self._straight
         speed = float(np.hypot(*drift(self._section)[1]))
         return speed * unit(drift(self._section[-HEADING:])[1])

@@ -1,9 +1,9 @@
 """Vehicles with the shadows they cast: all to one side, and most about as far.
 
-Pixel by pixel a dark roof and a shadow are the same. But where a vehicle is bright its shadow can be told
-from it (`tracker.aerial.darkening`), and all vehicles have one sun: the offset that is learnt from
-bright ones is taken off the others. A vehicle of the road's colour shows little but its shadow, its windows
-and its ends: what lies between them is its own, since both it and its shadow are convex.
+Pixel by pixel a dark roof and a shadow are the same. But where a vehicle is bright or coloured its shadow can
+be told from it (`tracker.aerial.darkening`), and all have one sun (`tracker.aerial.sun`): the offset that is
+learnt from those is taken off the others. A vehicle of the road's colour shows little but its shadow, its
+windows and its ends: what lies between them is its own, since both it and its shadow are convex.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ from collections import deque
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tracker.aerial.background import Background
 from tracker.aerial.darkening import Shadows
+from tracker.aerial.sun import Sun
 from tracker.motorcycle_lane.blobs import find_blobs
 
 Floats = NDArray[np.float64]
@@ -23,10 +25,12 @@ Mask = NDArray[np.bool_]
 
 EVERY = 5
 """Frames between two that are learnt from."""
-BRIGHT = (0.3, 0.8)
-"""Share of a region that is no shadow, where it tells of the offset."""
-LEAST_AREA = 60
-ENOUGH, MEMORY = 8, 120
+SHORTEST = 0.5
+"""Px of an offset from which on shadows are taken off."""
+OWN = 0.3
+"""Share of a region that is a vehicle's for sure, from which on its shadow is measured, not presumed ..."""
+BOUNDS = (0.6, 2.5)
+"""... between these usual ones."""
 AREAS = 1000
 """Regions whose median area is the usual one."""
 SOLID = 0.55
@@ -39,18 +43,17 @@ GRAIN = np.ones((3, 3), np.uint8)
 
 
 class CastShadows:
-    """Learns where the shadows of one scene fall, and takes them off.
-
-    Attributes:
-        offset: (2,) px of the mosaic from the edge of a vehicle to that of its shadow.
-    """
+    """Takes the shadows of one scene off its vehicles."""
 
     def __init__(self) -> None:
-        self.offset: Floats = np.zeros(2)
-        self._shadows = Shadows()
-        self._offsets: deque[Floats] = deque(maxlen=MEMORY)
+        self._shadows, self._sun = Shadows(), Sun()
         self._areas: deque[int] = deque(maxlen=AREAS)
         self._frame = 0
+
+    @property
+    def offset(self) -> Floats:
+        """(2,) px of the mosaic from the edge of a usual vehicle to that of its shadow."""
+        return self._sun.offset
 
     def take_off(self, background: Background, mask: Mask) -> Mask:
         """Return the foreground (H, W) of the last picture without the shadows, and learn where they fall.
@@ -63,34 +66,69 @@ class CastShadows:
             mask: (H, W) foreground of its view.
         """
         self._frame += 1
-        lit = self._shadows.remove(background.laid, background.picture(), mask)
-        lit = _as_mask(cv2.morphologyEx(lit.view(np.uint8), cv2.MORPH_OPEN, GRAIN))
+        bounds = background.low, background.high
+        lit, own = self._shadows.remove(background.laid, background.picture(), mask, bounds)
+        lit, own = (_as_mask(cv2.morphologyEx(m.view(np.uint8), cv2.MORPH_OPEN, GRAIN)) for m in (lit, own))
+        whole, dark = filled(mask), mask & ~lit
+        usual = float(np.median(self._areas or [np.inf]))
         if self._frame % EVERY == 0:
-            self._learn(mask, lit)
-        vehicles = along(filled(mask), self.offset) | lit
-        lit = _as_mask(cv2.morphologyEx(lit.view(np.uint8), cv2.MORPH_CLOSE, GRAIN))
+            self._sun.learn(whole, dark, own, background.valid, usual)
+        vehicles = self._sunny_side(whole, dark, own) | lit
         blobs = find_blobs(vehicles, SMALLEST)
         self._areas.extend(blobs.areas.tolist())
-        large = blobs.areas > LARGE * np.median(self._areas or [np.inf])
+        lit = _as_mask(cv2.morphologyEx(lit.view(np.uint8), cv2.MORPH_CLOSE, GRAIN))
         light = np.bincount(blobs.labels[lit], minlength=len(blobs) + 1)[1:]
-        joined = np.append(False, large & (light > LIT * blobs.areas))
+        joined = np.append(False, (blobs.areas > LARGE * usual) & (light > LIT * blobs.areas))
         if not joined.any():
             return vehicles
         return np.where(joined[blobs.labels], filled(lit), vehicles)
 
-    def _learn(self, mask: Mask, lit: Mask) -> None:
-        """Learn from regions of which a part is lit: how much farther the whole reaches to each side."""
-        blobs = find_blobs(mask, LEAST_AREA)
+    def _sunny_side(self, whole: Mask, dark: Mask, own: Mask) -> Mask:
+        """Return (H, W) the regions without what lies on their far side, seen from the sun."""
+        usual = float(np.hypot(*self.offset))
+        if usual < SHORTEST:
+            return whole
+        blobs = find_blobs(whole, SMALLEST)
+        lengths = np.full(len(blobs) + 1, usual)
         for k, box in enumerate(blobs.boxes.astype(int).tolist()):
             part = np.s_[box[1] : box[3], box[0] : box[2]]
             region = blobs.labels[part] == k + 1
-            rows, columns = np.nonzero(region & lit[part])
-            if BRIGHT[0] < len(rows) / np.count_nonzero(region) < BRIGHT[1]:
-                high, wide = region.shape
-                right = wide - 1 - columns.max() - columns.min()
-                self._offsets.append(np.array([right, high - 1 - rows.max() - rows.min()], float))
-        if len(self._offsets) >= ENOUGH:
-            self.offset = np.median(np.array(self._offsets), axis=0)
+            if np.count_nonzero(region & own[part]) > OWN * blobs.areas[k]:
+                low, high = BOUNDS
+                lengths[k + 1] = np.clip(
+                    self._sun.reach(region, dark[part], own[part]), low * usual, high * usual
+                )
+        return np.asarray(goes_on(blobs.labels, self.offset / usual, np.round(lengths).astype(np.int64)))
+
+
+@njit(cache=True)
+def goes_on(labels, direction, lengths):  # type: ignore[no-untyped-def]
+    """Tell where regions go on to one side.
+
+    Args:
+        labels: (H, W) of regions 1 ... R.
+        direction: (2,) unit vector.
+        lengths: (R + 1,) px.
+
+    Returns:
+        (H, W) whether the pixels from there on are the same region's for its length. Beyond the picture they
+        are.
+    """
+    height, width = labels.shape
+    left = np.zeros((height, width), np.bool_)
+    for i in range(height):
+        for j in range(width):
+            label = labels[i, j]
+            if label == 0:
+                continue
+            left[i, j] = True
+            for step in range(1, lengths[label] + 1):
+                x = int(np.floor(j + 0.5 + step * direction[0]))
+                y = int(np.floor(i + 0.5 + step * direction[1]))
+                if 0 <= x < width and 0 <= y < height and labels[y, x] != label:
+                    left[i, j] = False
+                    break
+    return left
 
 
 def filled(mask: Mask) -> Mask:
@@ -104,18 +142,6 @@ def filled(mask: Mask) -> Mask:
         if np.count_nonzero(region) >= SOLID * np.count_nonzero(hull):
             whole[box[1] : box[3], box[0] : box[2]] |= hull
     return _as_mask(whole)
-
-
-def along(mask: Mask, offset: Floats) -> Mask:
-    """Return (H, W) where a mask is set all along an offset (2,) from there."""
-    reach = np.round(offset).astype(int)
-    steps = int(np.abs(reach).max())
-    if not steps:
-        return mask
-    ways = np.round(np.linspace(0.0, 1.0, steps + 1)[:, None] * reach).astype(int)
-    kernel = np.zeros((2 * steps + 1, 2 * steps + 1), np.uint8)
-    kernel[steps + ways[:, 1], steps + ways[:, 0]] = 1
-    return _as_mask(cv2.erode(mask.view(np.uint8), kernel, borderValue=1))
 
 
 def _as_mask(image: NDArray[np.generic]) -> Mask:

@@ -2,6 +2,7 @@
 uniform sampler2DArray u_textures;
 uniform vec4 u_material[22];  // share of the body's colour, least reflection, more of it by the alpha, retro-reflection
 uniform float u_street;
+uniform sampler2D u_shadow;
 in vec3 v_at;
 in vec3 v_normal;
 in vec3 v_uv;
@@ -17,6 +18,7 @@ layout(location = 2) out float o_depth;
 #define HEAD_LAMP 7
 #define FACADE 13
 #define STREET_LAMP 16
+#define FIRST_VEHICLE 1048576u
 
 // What a face sends out by itself.
 vec3 glow(int surface, vec3 plain, float alpha) {
@@ -48,7 +50,10 @@ void main() {
     float up = 0.5 + 0.5 * normal.z;
     float shade = clamp(0.45 + 0.7 * v_height, 0.45, 1.0);  // less sky near the ground
     vec3 ambient = mix(0.18 * (u_sun_colour * max(u_sun.z, 0.0) + u_horizon), 0.35 * u_zenith + 0.65 * u_horizon, up);
-    vec3 light = u_sun_colour * max(dot(normal, u_sun), 0.0) + shade * ambient;
+    // On a bridge lie the shadows of what drives there.
+    bool carries = v_id < FIRST_VEHICLE && normal.z > 0.9;
+    float sunlit = carries ? 1.0 - texelFetch(u_shadow, ivec2(gl_FragCoord.xy), 0).g : 1.0;
+    vec3 light = sunlit * u_sun_colour * max(dot(normal, u_sun), 0.0) + shade * ambient;
     vec3 mirror = reflect(view, normal);
     vec3 world = mix(0.12 * (u_sun_colour + u_horizon), sky(mirror.z), clamp(mirror.z * 11.0 + 0.55, 0.0, 1.0));
     float grazing = 1.0 - facing;
@@ -66,7 +71,7 @@ void main() {
     float beam = own_beam(v_at, normal);
     light += lamplight(v_at, normal, 60.0) + beam * vec3(1.0, 0.86, 0.68) * (1.0 + material.w);
 #endif
-    vec3 colour = mix(albedo * light, world, reflection) + glint * u_sun_colour + glow(surface, plain, texel.a);
+    vec3 colour = mix(albedo * light, world, reflection) + sunlit * glint * u_sun_colour + glow(surface, plain, texel.a);
     o_colour = vec4(film(hazed(colour, distance)), 1.0);
     o_id = v_id;
     o_depth = v_depth;

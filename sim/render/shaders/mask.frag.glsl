@@ -1,6 +1,7 @@
-// Marks what is covered.
-out float o_covered;
+// Marks what is covered: of the ground, and of bridges.
+flat in vec2 v_falls;
+out vec2 o_covered;
 
 void main() {
-    o_covered = 1.0;
+    o_covered = v_falls;
 }

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracker.aerial.background import Background
-from tracker.aerial.shadows import EVERY, CastShadows, along, filled
+from tracker.aerial.shadows import EVERY, CastShadows, filled, goes_on
 
 NONE = np.zeros((0, 4))
 
@@ -18,28 +18,17 @@ ROAD = np.array([110, 112, 114], np.uint8)
 SHADE = (0.55 * ROAD).astype(np.uint8)
 
 
-@given(st.integers(-5, 5), st.integers(-5, 5), st.integers(0, 1000))
+@given(st.floats(0.0, 6.3), st.lists(st.integers(0, 6), min_size=3, max_size=3), st.integers(0, 1000))
 @settings(max_examples=30, deadline=None)
-def test_along_an_offset_is_everywhere_on_the_way(right, down, seed):
-    mask = cv2.medianBlur((np.random.default_rng(seed).random((40, 50)) < 0.7).astype(np.uint8), 5) > 0
-    left = along(mask, np.array([right, down], float))
-    steps = max(abs(right), abs(down))
-    for i, j in np.ndindex(mask.shape):
-        expected = True
-        for share in np.linspace(0.0, 1.0, steps + 1):
-            y, x = i + int(np.round(share * down)), j + int(np.round(share * right))
-            expected &= not (0 <= y < 40 and 0 <= x < 50) or bool(mask[y, x])
-        assert left[i, j] == expected
-
-
-def test_a_rectangle_is_found_again_without_its_shadow():
-    mask = np.zeros((60, 80), bool)
-    for share in np.linspace(0, 1, 5):
-        y, x = round(20 + 4 * share), round(30 + 3 * share)
-        mask[y : y + 10, x : x + 20] = True
-    left = along(mask, np.array([3.0, 4.0]))
-    assert left[20:30, 30:50].all()
-    assert left.sum() <= 10 * 20 + 12
+def test_a_region_goes_on_where_every_pixel_on_the_way_is_its_own(angle, reaches, seed):
+    labels = np.random.default_rng(seed).integers(0, 3, (10, 12)).repeat(3, 0).repeat(3, 1).astype(np.int32)
+    side = np.array([np.cos(angle), np.sin(angle)])
+    found = goes_on(labels, side, np.array(reaches))
+    for i, j in np.ndindex(labels.shape):
+        label = labels[i, j]
+        ways = [(j + 0.5, i + 0.5) + step * side for step in range(1, reaches[label] + 1)]
+        inside = [(int(np.floor(y)), int(np.floor(x))) for x, y in ways if 0 <= x < 36 and 0 <= y < 30]
+        assert found[i, j] == (label > 0 and all(labels[at] == label for at in inside))
 
 
 @given(st.integers(0, 1000))
@@ -94,6 +83,20 @@ def test_the_offset_is_learnt_from_vehicles_of_any_colour(colour):
     rows, columns = np.nonzero(left)
     assert (rows.min(), rows.max()) == pytest.approx((40, 49), abs=1)
     assert np.ptp(columns) == pytest.approx(23, abs=2)
+
+
+def test_a_dark_vehicle_gets_the_usual_shadow_taken_off_and_a_tall_bright_one_its_own():
+    def draw(seen, x):
+        _with_shadow(seen, x, 20, (235, 230, 228))
+        _with_shadow(seen, 130 - x, 60, SHADE)
+        if x > 30:
+            _with_shadow(seen, x, 90, (160, 40, 30), fall=8)
+
+    shadows, left = _drive(20 * EVERY, draw)
+    assert shadows.offset == pytest.approx([0.0, 4.0], abs=1.0)
+    for top in (20, 60, 90):
+        rows = np.flatnonzero(left[top - 5 : top + 25].any(1)) + top - 5
+        assert (rows[0], rows[-1]) == pytest.approx((top, top + 9), abs=1)
 
 
 def test_vehicles_that_a_shadow_joins_fall_apart():
