@@ -22,8 +22,8 @@ Floats = NDArray[np.float64]
 # After so many trees an outline with odds below HOPELESS is given up: the others could not save it.
 FIRST, HOPELESS = 40, -4.0
 # Sides that go on over a car's roof and an edge where a van's or a lorry's would be tell more than the trees
-# make of them: log odds of the high roof for each unit of the edge's strength and of the sides', and for none.
-PER_EDGE, PER_SIDE, NEITHER = 1.5, 1.0, -5.0
+# make of them: log odds of the high roof for each unit of the edge and of the sides, and for neither.
+PER_EDGE, PER_SIDE, NEITHER = 1.5, 1.0, -4.5
 # A tree's leaves have a bit each in a word.
 MOST_LEAVES = 32
 

@@ -200,8 +200,10 @@ class TraceStore:
 
         To all others every centre.
         """
-        for trace in self.live:
-            trace["bounds"] = boxes.get(int(trace["id"]), EVERYWHERE)
+        live = self.live
+        live["bounds"] = EVERYWHERE
+        for place in np.flatnonzero(np.isin(live["id"], list(boxes))).tolist():
+            live["bounds"][place] = boxes[int(live["id"][place])]
 
     def slopes(self) -> tuple[Floats, Floats]:
         """Return v and its standard deviation, (N,) each, px/s."""

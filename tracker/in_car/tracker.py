@@ -127,7 +127,7 @@ class InCarTracker:
         return tracks
 
     def _bounds(self) -> dict[int, Floats]:
-        """Return the boxes (4,), working px, in which the traces of sure vehicles stay, by the traces' ids."""
+        """Return the boxes (4,), working px, in which traces of sure vehicles stay, by the traces' ids."""
         boxes = {vehicle.id: _stretched(vehicle.box) for vehicle in self._vehicles.vehicles}
         return {trace: boxes[body] for trace, body in self._bodies.items() if body in boxes}
 

@@ -61,7 +61,9 @@ def test_a_trace_with_bounds_does_not_follow_what_leaves_them(way, bound):
         store.step(centres((x, y), (x + 300, y)))
     # The same thing goes on as another trace.
     assert store.live["id"].tolist() == ([2, 3] if bound else [1, 2])
-    assert np.allclose(store.live["mean"][np.argsort(store.live["mean"][:, 0, 0]), 0, 0], [x, x + 300], atol=1)
+    assert np.allclose(
+        store.live["mean"][np.argsort(store.live["mean"][:, 0, 0]), 0, 0], [x, x + 300], atol=1
+    )
 
 
 @pytest.mark.parametrize(("widest", "ids"), [(35, [1]), (25, [2])])
