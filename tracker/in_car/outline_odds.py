@@ -15,15 +15,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.in_car.cues import Cue
-
 Floats = NDArray[np.float64]
 
 # After so many trees an outline with odds below HOPELESS is given up: the others could not save it.
 FIRST, HOPELESS = 40, -4.0
-# Sides that go on over a car's roof and an edge where a van's or a lorry's would be tell more than the trees
-# make of them: log odds of the high roof for each unit of the edge and of the sides, and for neither.
-PER_EDGE, PER_SIDE, NEITHER = 1.5, 1.0, -4.5
 # A tree's leaves have a bit each in a word.
 MOST_LEAVES = 32
 
@@ -101,20 +96,3 @@ def log_odds(found: Floats, weighed_by: Trees) -> Floats:
     """Return the log odds (K,) of outlines with the cues (K, C)."""
     result: Floats = _sum(found.astype(np.float32), *weighed_by)
     return result
-
-
-def under_roofs(found: Floats, boxes: Floats, odds: Floats) -> tuple[Floats, Floats]:
-    """Decide how high each outline is.
-
-    Args:
-        found: (2 K, C) cues of K outlines, first all under low roofs, then under high ones.
-        boxes: (2 K, 4) likewise.
-        odds: (2 K,) log odds likewise.
-
-    Returns:
-        (K, 4) boxes under the likelier roofs, and (K,) log odds that there is a vehicle, however high.
-    """
-    count = len(odds) // 2
-    shown = PER_EDGE * found[count:, Cue.ROOF] + PER_SIDE * found[:count, Cue.SIDE_ABOVE] + NEITHER
-    high = odds[count:] + shown > odds[:count]
-    return np.where(high[:, None], boxes[count:], boxes[:count]), np.maximum(odds[:count], odds[count:])

@@ -36,8 +36,8 @@ INNER, RIM = 0.05, 0.06
 # What speaks against a trace in no vehicle's box being a car's, as log odds.
 UNBOXED = 1.8
 # Bound of a trace's log odds: one that reaches it in a sure vehicle's box stays with that vehicle, in its box
-# and so far around it, as shares of its width and of its height.
-FIRM = 5.0
+# and so far around it, as shares of its width and of its height. One that first was surely none is nobody's.
+FIRM, NOBODY = 5.0, 0
 AROUND_X, AROUND_Y = 0.15, 0.2
 # Frames that a point must have been followed before its motion says anything.
 RIPE = 4
@@ -175,10 +175,13 @@ class InCarTracker:
                 gain = near[index] - UNBOXED
             odds = float(np.clip(odds + gain / (self._info.rate * CORRELATION), -FIRM, FIRM))
             odds_now[trace] = odds
-            if owner and sure[owner] and odds == FIRM:
-                bodies[trace] = owner
-            elif trace in self._bodies:
-                bodies[trace] = self._bodies[trace]
+            body = self._bodies.get(trace)
+            if odds == -FIRM:
+                body = NOBODY
+            elif odds == FIRM and owner and sure[owner] and body != NOBODY:
+                body = owner
+            if body is not None:
+                bodies[trace] = body
             if traces.age[index] >= 0.3:
                 labels[index] = Label.CAR if odds > 0 else Label.BACKGROUND
             chances[index] = 1.0 / (1.0 + np.exp(-odds))

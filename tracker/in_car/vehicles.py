@@ -12,7 +12,7 @@ from tracker.in_car.body import body_motion, covered, inward
 from tracker.in_car.cues import Cue, cues
 from tracker.in_car.features import Picture
 from tracker.in_car.lamps import on_lamp
-from tracker.in_car.outline_odds import Trees, log_odds, under_roofs
+from tracker.in_car.outline_odds import Trees, log_odds
 from tracker.in_car.outlines import outlines
 from tracker.in_car.points import PointStore
 from tracker.in_car.relief import Relief, make_relief
@@ -183,7 +183,11 @@ class VehicleStore:
         measured, windows = cues(relief, found, *seen)
         odds = log_odds(measured, self._trees)
         self.sighting = Sighting(boxes=windows, cues=measured, odds=odds)
-        windows, odds = under_roofs(measured, windows, odds)
+        # Of the two roofs the likelier.
+        count = len(found)
+        tall = odds[count:] > odds[:count]
+        odds = np.where(tall, odds[count:], odds[:count])
+        windows = np.where(tall[:, None], windows[count:], windows[:count])
         for index, vehicle in enumerate(self.vehicles):
             self._hold(vehicle, expected[index], windows, odds, index, relief, speed)
         first = len(self.vehicles)

@@ -6,20 +6,16 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracker.in_car.cues import COUNT, Cue
+from tracker.in_car.cues import COUNT
 from tracker.in_car.outline_odds import (
     FIRST,
     HOPELESS,
     MOST_LEAVES,
-    NEITHER,
-    PER_EDGE,
-    PER_SIDE,
     Trees,
     _hash,
     _sum,
     learnt_trees,
     log_odds,
-    under_roofs,
 )
 
 
@@ -108,19 +104,3 @@ def test_every_leaf_has_a_place_of_its_own():
 
 def test_no_outlines_no_odds():
     assert log_odds(np.empty((0, COUNT)), learnt_trees()).shape == (0,)
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(0, 6))
-def test_a_high_roof_is_chosen_by_its_odds_its_edge_and_the_sides_below_it(seed, count):
-    rng = np.random.default_rng(seed)
-    found, boxes = rng.uniform(0, 4, (2 * count, COUNT)), rng.uniform(0, 300, (2 * count, 4))
-    odds = rng.normal(0, 2, 2 * count)
-    windows, best = under_roofs(found, boxes, odds)
-    assert len(windows) == len(best) == count
-    for k in range(count):
-        low, high = odds[k], odds[count + k]
-        edge, sides = found[count + k][Cue.ROOF], found[k][Cue.SIDE_ABOVE]
-        shown = high + PER_EDGE * edge + PER_SIDE * sides + NEITHER
-        place = count + k if shown > low else k
-        assert windows[k].tolist() == boxes[place].tolist()
-        assert best[k] == max(low, high)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracker.in_car.traces import TraceSet
-from tracker.in_car.tracker import AROUND_X, AROUND_Y, INNER, RIM, InCarTracker, _at_feet, _in_boxes
+from tracker.in_car.tracker import AROUND_X, AROUND_Y, FIRM, INNER, RIM, InCarTracker, _at_feet, _in_boxes
 from tracker.in_car.vehicles import Vehicle
 from tracker.types import Info, Label, Status, Tracks
 
@@ -96,6 +96,8 @@ def test_a_trace_that_was_long_in_a_sure_vehicles_box_stays_with_it(status):
     box = np.array([100.0, 100, 140, 130])
     tracks = Tracks(ids=np.array([7]), boxes=box[None], status=np.array([status], np.uint8))
     tracker._vehicles.vehicles = [Vehicle(id=7, box=box, log_width=0.0)]
+    if status == Status.TENTATIVE:  # As sure as it can be, by its points.
+        tracker._odds = {1: FIRM}
     bounded = []
     for _ in range(30):
         tracker._label(traces_at((120, 115), (300, 115)), tracks, scale=1.0)
@@ -111,6 +113,19 @@ def test_a_trace_that_was_long_in_a_sure_vehicles_box_stays_with_it(status):
         assert set(tracker._bounds()) == {1}
     tracker._vehicles.vehicles = []
     assert tracker._bounds() == {}
+
+
+def test_a_trace_that_was_surely_background_is_bound_to_no_vehicle_that_comes():
+    tracker = InCarTracker()
+    tracker.start(Info(width=640, height=480, rate=30.0, intrinsics=None))
+    tracker._vehicles.vehicles = [Vehicle(id=7, box=np.array([100.0, 100, 140, 130]), log_width=0.0)]
+    for left in [300.0] * 60 + [100.0] * 60:
+        boxes = np.array([[left, 100, left + 40, 130]])
+        tracks = Tracks(ids=np.array([7]), boxes=boxes, status=np.array([Status.CONFIRMED], np.uint8))
+        tracker._label(traces_at((120, 115), (320, 115)), tracks, scale=1.0)
+    assert tracker.diagnostics.traces is not None
+    assert tracker.diagnostics.traces.labels.tolist() == [Label.CAR, Label.BACKGROUND]
+    assert set(tracker._bounds()) == set()
 
 
 def test_a_trace_in_no_box_is_background():
