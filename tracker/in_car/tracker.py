@@ -219,7 +219,8 @@ class InCarTracker:
 def _stretched(box: Floats) -> Floats:
     """Return a box (4,) with what is around it where its traces may be."""
     aside, beyond = AROUND_X * (box[2] - box[0]), AROUND_Y * (box[3] - box[1])
-    return box + np.array([-aside, -beyond, aside, beyond])
+    stretched: Floats = box + np.array([-aside, -beyond, aside, beyond])
+    return stretched
 
 
 def _at_feet(traces: TraceSet, tracks: Tracks) -> NDArray[np.bool_]:
