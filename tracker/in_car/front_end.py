@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,11 +54,12 @@ class FrontEnd:
         top, bottom = self.band()
         self.features = find_features(picture, top, bottom)
 
-    def trace(self, shift: float = 0.0) -> TraceSet:
+    def trace(self, shift: float = 0.0, boxes: Mapping[int, NDArray[np.float64]] | None = None) -> TraceSet:
         """Condense the features, continue the traces.
 
         Args:
             shift: Vertical jump of the picture since the last frame, working px, where it is known.
+            boxes: (4,) working px, in which traces stay that belong to a vehicle, by their ids.
         """
         picture, features = self.picture, self.features
         width = picture.grey.shape[1]
@@ -68,6 +71,7 @@ class FrontEnd:
         lamp_spans = np.stack([lamps[:, 0] - 0.5, lamps[:, 0] + 0.5], 1)
         lamp_profile = prof.smooth(prof.condense(lamp_spans, np.ones(len(lamps)), width), prof.SMOOTHING)
         centres = prof.find_centres(features, segment_profile, self.horizon / picture.scale)
+        self._store.bound(boxes or {})
         self._store.step(centres, shift)
         self.profiles = {
             name: self._stretch(values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,8 @@ Ids = NDArray[np.int64]
 # Measurement noise of a centre, px, and the spectral density of its acceleration, px^2/s^3.
 NOISE_X, NOISE_Y, AGILITY_X, AGILITY_Y = 1.2, 2.0, 3000.0, 800.0
 GATE = 16.0
+# Bounds of a trace that has none: x0, y0, x1, y1.
+EVERYWHERE = np.array([-np.inf, -np.inf, np.inf, np.inf])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,8 +71,11 @@ def slope_error(noise: float, rate: float, count: NDArray[np.int64]) -> Floats:
 
 
 @njit(cache=True)
-def _costs(mean, covariance, width, kind, x, y, wide, kinds):  # type: ignore[no-untyped-def]
-    """Squared distances (N, M) of N traces and M centres in x, y and log width, infinite beyond the gate."""
+def _costs(mean, covariance, width, kind, bounds, x, y, wide, kinds):  # type: ignore[no-untyped-def]
+    """Squared distances (N, M) of N traces and M centres in x, y and log width, infinite beyond the gate.
+
+    And outside a trace's bounds (N, 4).
+    """
     costs = np.full((width.size, x.size), np.inf)
     for i in range(width.size):
         spread_x = min(covariance[i, 0, 0, 0], 9.0) + NOISE_X**2
@@ -77,6 +83,9 @@ def _costs(mean, covariance, width, kind, x, y, wide, kinds):  # type: ignore[no
         for j in range(x.size):
             apart = (mean[i, 0, 0] - x[j]) ** 2 / spread_x
             if apart > GATE or kind[i] != kinds[j]:
+                continue
+            x0, y0, x1, y1 = bounds[i]
+            if not (x0 < x[j] < x1 and y0 < y[j] < y1 and wide[j] < x1 - x0):
                 continue
             # Which segments of an object are found changes from frame to frame: its row is less sure
             # than its middle.
@@ -119,7 +128,7 @@ def _slopes(history):  # type: ignore[no-untyped-def]
 
 
 def _record(fit: int) -> np.dtype[np.void]:
-    """Return what is kept of a trace: its state and covariance in x and y, and its last x."""
+    """Return what is kept of a trace: its state and covariance in x and y, its last x, its bounds."""
     return np.dtype(
         [
             ("id", np.int64),
@@ -132,6 +141,7 @@ def _record(fit: int) -> np.dtype[np.void]:
             ("missed", np.int64),
             ("source", np.int64),
             ("kind", np.uint8),
+            ("bounds", np.float64, 4),
         ],
         align=True,
     )
@@ -171,6 +181,7 @@ class TraceStore:
             live["covariance"],
             live["width"],
             live["kind"],
+            live["bounds"],
             centres.x,
             centres.y,
             centres.width,
@@ -183,6 +194,16 @@ class TraceStore:
         taken = np.zeros(len(centres.x), bool)
         taken[columns] = True
         self.live = np.concatenate([live[patient], self._begin(np.flatnonzero(~taken), centres)])
+
+    def bound(self, boxes: Mapping[int, Floats]) -> None:
+        """Leave to the traces with these ids only centres in and no wider than their boxes (4,), px.
+
+        To all others every centre.
+        """
+        live = self.live
+        live["bounds"] = EVERYWHERE
+        for place in np.flatnonzero(np.isin(live["id"], list(boxes))).tolist():
+            live["bounds"][place] = boxes[int(live["id"][place])]
 
     def slopes(self) -> tuple[Floats, Floats]:
         """Return v and its standard deviation, (N,) each, px/s."""
@@ -222,5 +243,5 @@ class TraceStore:
         begun["history"] = np.nan
         begun["history"][:, -1] = centres.x[fresh]
         begun["width"], begun["kind"] = centres.width[fresh], centres.kind[fresh]
-        begun["hits"], begun["source"] = 1, fresh
+        begun["hits"], begun["source"], begun["bounds"] = 1, fresh, EVERYWHERE
         return begun

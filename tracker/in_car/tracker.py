@@ -35,6 +35,10 @@ NEAR_ROWS = 0.11
 INNER, RIM = 0.05, 0.06
 # What speaks against a trace in no vehicle's box being a car's, as log odds.
 UNBOXED = 1.8
+# Bound of a trace's log odds: one that reaches it in a sure vehicle's box stays with that vehicle, in its box
+# and so far around it, as shares of its width and of its height. One that first was surely none is nobody's.
+FIRM, NOBODY = 5.0, 0
+AROUND_X, AROUND_Y = 0.15, 0.2
 # Frames that a point must have been followed before its motion says anything.
 RIPE = 4
 
@@ -59,6 +63,7 @@ class InCarTracker:
         self._vehicles = VehicleStore(rate=info.rate, trees=self._trees)
         self._ego: EgoMotion | None = None
         self._odds: dict[int, float] = {}
+        self._bodies: dict[int, int] = {}
         self._diagnostics = Diagnostics()
 
     @property
@@ -115,11 +120,16 @@ class InCarTracker:
             ego,
             FARTHEST * grey.shape[1],
         )
-        traces = self._front.trace(float(ego.shift[1]))
+        traces = self._front.trace(float(ego.shift[1]), self._bounds())
         tracks = self._tracks(scale)
         self._label(traces, tracks, scale)
         points.refill(grey, horizon)
         return tracks
+
+    def _bounds(self) -> dict[int, Floats]:
+        """Return the boxes (4,), working px, in which traces of sure vehicles stay, by the traces' ids."""
+        boxes = {vehicle.id: _stretched(vehicle.box) for vehicle in self._vehicles.vehicles}
+        return {trace: boxes[body] for trace, body in self._bodies.items() if body in boxes}
 
     def _static_weight(self) -> Floats:
         """Return (N,) how far a point's flow tells the camera's rotation."""
@@ -150,6 +160,7 @@ class InCarTracker:
         chances = np.full(len(traces), 0.5)
         sure = dict(zip(tracks.ids.tolist(), (tracks.status != Status.TENTATIVE).tolist(), strict=True))
         odds_now: dict[int, float] = {}
+        bodies: dict[int, int] = {}
         for index, (trace, owner) in enumerate(zip(traces.ids.tolist(), owners.tolist(), strict=True)):
             odds = self._odds.get(trace, 0.0)
             if owner and sure[owner]:
@@ -162,12 +173,19 @@ class InCarTracker:
                 gain = near[index]
             else:
                 gain = near[index] - UNBOXED
-            odds = float(np.clip(odds + gain / (self._info.rate * CORRELATION), -5.0, 5.0))
+            odds = float(np.clip(odds + gain / (self._info.rate * CORRELATION), -FIRM, FIRM))
             odds_now[trace] = odds
+            body = self._bodies.get(trace)
+            if odds == -FIRM:
+                body = NOBODY
+            elif odds == FIRM and owner and sure[owner] and body != NOBODY:
+                body = owner
+            if body is not None:
+                bodies[trace] = body
             if traces.age[index] >= 0.3:
                 labels[index] = Label.CAR if odds > 0 else Label.BACKGROUND
             chances[index] = 1.0 / (1.0 + np.exp(-odds))
-        self._odds = odds_now
+        self._odds, self._bodies = odds_now, bodies
         self._diagnostics = Diagnostics(
             traces=Traces(
                 ids=traces.ids,
@@ -196,6 +214,13 @@ class InCarTracker:
         )
         count = close.sum(1)
         return np.asarray((close * evidence[None]).sum(1) / np.maximum(count, 1))
+
+
+def _stretched(box: Floats) -> Floats:
+    """Return a box (4,) with what is around it where its traces may be."""
+    aside, beyond = AROUND_X * (box[2] - box[0]), AROUND_Y * (box[3] - box[1])
+    stretched: Floats = box + np.array([-aside, -beyond, aside, beyond])
+    return stretched
 
 
 def _at_feet(traces: TraceSet, tracks: Tracks) -> NDArray[np.bool_]:

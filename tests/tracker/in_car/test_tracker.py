@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracker.in_car.traces import TraceSet
-from tracker.in_car.tracker import INNER, RIM, _at_feet, _in_boxes
-from tracker.types import Status, Tracks
+from tracker.in_car.tracker import AROUND_X, AROUND_Y, FIRM, INNER, RIM, InCarTracker, _at_feet, _in_boxes
+from tracker.in_car.vehicles import Vehicle
+from tracker.types import Info, Label, Status, Tracks
 
 
 def drawn(seed, traces, tracks):
@@ -67,3 +69,73 @@ def test_at_the_feet_of_sure_tracks_is_road(seed, count, boxes):
             near = x0 - wide < x < x1 + wide and y1 - 0.1 * tall < y < y1 + 1.5 * tall
             expected |= status != Status.TENTATIVE and near
         assert found == expected
+
+
+def traces_at(*places):
+    """Traces that are old enough for a label, at (x, y)."""
+    count = len(places)
+    x, y = np.array(places, float).T
+    return TraceSet(
+        ids=np.arange(1, count + 1),
+        x=x,
+        y=y,
+        v=np.zeros(count),
+        sigma_v=np.zeros(count),
+        width=np.full(count, 10.0),
+        age=np.ones(count),
+        missed=np.zeros(count, np.int64),
+        points=np.zeros((0, 2)),
+        point_traces=np.zeros(0, np.int64),
+    )
+
+
+@pytest.mark.parametrize("status", [Status.CONFIRMED, Status.TENTATIVE])
+def test_a_trace_that_was_long_in_a_sure_vehicles_box_stays_with_it(status):
+    tracker = InCarTracker()
+    tracker.start(Info(width=640, height=480, rate=30.0, intrinsics=None))
+    box = np.array([100.0, 100, 140, 130])
+    tracks = Tracks(ids=np.array([7]), boxes=box[None], status=np.array([status], np.uint8))
+    tracker._vehicles.vehicles = [Vehicle(id=7, box=box, log_width=0.0)]
+    if status == Status.TENTATIVE:  # As sure as it can be, by its points.
+        tracker._odds = {1: FIRM}
+    bounded = []
+    for _ in range(30):
+        tracker._label(traces_at((120, 115), (300, 115)), tracks, scale=1.0)
+        bounded.append(set(tracker._bounds()))
+    assert bounded[9] == set()
+    assert bounded[-1] == ({1} if status == Status.CONFIRMED else set())
+    if status == Status.CONFIRMED:
+        aside, beyond = AROUND_X * 40, AROUND_Y * 30
+        expected = [100 - aside, 100 - beyond, 140 + aside, 130 + beyond]
+        assert tracker._bounds()[1] == pytest.approx(expected)
+        # Over its roof, and with another in its place, it is still the first one's.
+        tracker._label(traces_at((120, 90), (120, 115)), tracks, scale=1.0)
+        assert set(tracker._bounds()) == {1}
+    tracker._vehicles.vehicles = []
+    assert tracker._bounds() == {}
+
+
+def test_a_trace_that_was_surely_background_is_bound_to_no_vehicle_that_comes():
+    tracker = InCarTracker()
+    tracker.start(Info(width=640, height=480, rate=30.0, intrinsics=None))
+    tracker._vehicles.vehicles = [Vehicle(id=7, box=np.array([100.0, 100, 140, 130]), log_width=0.0)]
+    for left in [300.0] * 60 + [100.0] * 60:
+        boxes = np.array([[left, 100, left + 40, 130]])
+        tracks = Tracks(ids=np.array([7]), boxes=boxes, status=np.array([Status.CONFIRMED], np.uint8))
+        tracker._label(traces_at((120, 115), (320, 115)), tracks, scale=1.0)
+    assert tracker.diagnostics.traces is not None
+    assert tracker.diagnostics.traces.labels.tolist() == [Label.CAR, Label.BACKGROUND]
+    assert set(tracker._bounds()) == set()
+
+
+def test_a_trace_in_no_box_is_background():
+    tracker = InCarTracker()
+    tracker.start(Info(width=640, height=480, rate=30.0, intrinsics=None))
+    tracks = Tracks(ids=np.array([7]), boxes=np.array([[100.0, 100, 140, 130]]), status=np.zeros(1, np.uint8))
+    tracks.status[:] = Status.CONFIRMED
+    for _ in range(30):
+        tracker._label(traces_at((120, 115), (300, 115)), tracks, scale=1.0)
+    found = tracker.diagnostics.traces
+    assert found is not None
+    assert found.labels.tolist() == [Label.CAR, Label.BACKGROUND]
+    assert found.owners.tolist() == [7, 0]
