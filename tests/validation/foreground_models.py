@@ -20,8 +20,8 @@ from scenarios.loop import run_episode
 from scenarios.score.foreground import total_counts
 from scenarios.score.frames import scored_frames
 from scenarios.score.summary import DEFAULTS
+from tracker.blobs import clean
 from tracker.motorcycle_lane.background import PAPER, BackgroundModel
-from tracker.motorcycle_lane.blobs import clean
 from tracker.motorcycle_lane.shade import STANDING, expectation, shadow_of
 from tracker.motorcycle_lane.tracker import MotorcycleLaneTracker
 from tracker.types import Diagnostics, Frame, Info, Tracks

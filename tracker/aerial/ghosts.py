@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.aerial.background import Background
-from tracker.motorcycle_lane.blobs import Blobs
+from tracker.blobs import Blobs
 
 Floats = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tracker.aerial.background import Background
 from tracker.aerial.darkening import Shadows
 from tracker.aerial.sun import Sun
-from tracker.motorcycle_lane.blobs import find_blobs
+from tracker.blobs import find_blobs
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

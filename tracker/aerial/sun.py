@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.motorcycle_lane.blobs import find_blobs
+from tracker.blobs import find_blobs
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

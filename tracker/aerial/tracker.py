@@ -26,7 +26,7 @@ from tracker.aerial.shadows import CastShadows
 from tracker.aerial.stabilisation import Floats, Stabiliser, inverse, jacobian, transform
 from tracker.aerial.tracks import Track
 from tracker.aerial.trajectories import Trajectories
-from tracker.motorcycle_lane.blobs import Blobs, clean, find_blobs
+from tracker.blobs import Blobs, clean, find_blobs
 from tracker.types import Diagnostics, Frame, Info, Predictions, Status, Tracks
 
 LEAST_AREA = 30

@@ -193,7 +193,7 @@ class BackgroundModel:
             image: (H, W, 3) uint8 RGB.
 
         Returns:
-            (H, W) foreground, raw: see `tracker.motorcycle_lane.blobs.clean`.
+            (H, W) foreground, raw: see `tracker.blobs.clean`.
 
         Raises:
             ValueError: If the image has another size than the model.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.motorcycle_lane.blobs import Blobs, clean, find_blobs
+from tracker.blobs import Blobs, clean, find_blobs
 
 LEAST_AREA = 25 / (360 * 240)
 """Smallest region, as a share of the picture."""

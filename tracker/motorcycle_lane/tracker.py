@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.blobs import clean
 from tracker.motorcycle_lane.background import BackgroundModel
-from tracker.motorcycle_lane.blobs import clean
 from tracker.motorcycle_lane.episode import EpisodeTracker
 from tracker.motorcycle_lane.flow import Flow
 from tracker.motorcycle_lane.front_end import Sight, look

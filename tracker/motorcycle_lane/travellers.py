@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.motorcycle_lane.blobs import Blobs
+from tracker.blobs import Blobs
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tracker.aerial.background import Background
 from tracker.aerial.ghosts import contrast
-from tracker.motorcycle_lane.blobs import find_blobs
+from tracker.blobs import find_blobs
 
 NONE = np.zeros((0, 4))
 STOOD, STANDS = np.s_[20:32, 20:44], np.s_[60:72, 60:84]

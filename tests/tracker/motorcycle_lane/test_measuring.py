@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tracker.blobs import find_blobs
 from tracker.motorcycle_lane import colour, measuring, silhouettes
-from tracker.motorcycle_lane.blobs import find_blobs
 from tracker.motorcycle_lane.sizes import SizeModel, robust_lines
 
 

@@ -8,10 +8,10 @@ import pytest
 
 from tests.tracker.motorcycle_lane.lane import HEIGHT, RATE, WIDTH, Rider, draw
 from tracker import registry
+from tracker.blobs import clean
 from tracker.boxes import iou
 from tracker.motorcycle_lane import shade
 from tracker.motorcycle_lane.background import PAPER, BackgroundModel
-from tracker.motorcycle_lane.blobs import clean
 from tracker.types import Frame, Info, Status
 
 NAMES = ("motorcycle-lane", "motorcycle-lane:paper", "motorcycle-lane:mog2-nn")

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracker.motorcycle_lane.blobs import find_blobs
+from tracker.blobs import find_blobs
 from tracker.motorcycle_lane.travellers import FRAMES, Travellers, only_pairs
 
 
