@@ -3,7 +3,8 @@
 A predictor is a track with a section like the last F points of the hidden one (`tracker.aerial.lyapunov`).
 From the end of that section on it shows the way, also where it did so long ago: B_i of the paper. The
 regression (`tracker.aerial.regression`) goes from where the predictors were then to where they are. When one
-of them ends or leaves the common way, the forecast goes on from its last point with those that remain.
+of them ends or leaves the common way, the forecast goes on from its last point with those that remain; with
+none it follows the road (`tracker.aerial.road`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from tracker.aerial import lyapunov
 from tracker.aerial.forecasts import WINDOW, Growth, drift, last_section, line, unit
 from tracker.aerial.regression import carry
+from tracker.aerial.road import course
 from tracker.aerial.trajectories import Trajectories
 
 Floats = NDArray[np.float64]
@@ -38,11 +40,12 @@ class ContextParameters:
         fewest: With fewer there is no regression, and the forecast goes straight on: 3 as printed.
         ridge: lambda of `regression.affine`, px^2.
         paced: Whether a predictor's clock runs as fast as the predictand went beside it.
-        doubt: How many usual errors of a straight line the way of a single predictor must be off it to count;
-            several count for more. 0 believes the predictors.
+        doubt: How many usual errors the way of a single predictor must be off that of who keeps to the road
+            at its speed to count; several count for more. 0 believes the predictors.
         journey: Px from one end of a predictor's path to the other at least: what stands and shakes shows
             nobody the way.
         search_every: Frames between two searches for more predictors.
+        roads: Whether a forecast without predictors follows the road, as all paths show it.
     """
 
     window: int = WINDOW
@@ -59,6 +62,7 @@ class ContextParameters:
     doubt: float = 1.0
     journey: float = 60.0
     search_every: int = 5
+    roads: bool = True
 
 
 PRINTED = ContextParameters(
@@ -73,6 +77,7 @@ PRINTED = ContextParameters(
     doubt=0.0,
     journey=0.0,
     search_every=1,
+    roads=False,
 )
 """As printed, with alpha regularised: without that every exponent is infinite."""
 
@@ -140,9 +145,10 @@ class ContextForecast:
         self._trajectories, self._track = trajectories, track
         section, self._tick = last_section(trajectories, track, self._parameters.window)
         self._began = self._base = self._tick
-        self.point = self._line = self._carried = self._base_point = drift(section[-ANCHOR:])[0]
-        self.velocity = self._straight = drift(section)[1]
-        self._witnesses, self._turned = 0, False
+        self.point = self._steady = self._carried = self._base_point = drift(section[-ANCHOR:])[0]
+        self.velocity = drift(section)[1]
+        self._speed, self._ahead = float(np.hypot(*self.velocity)), unit(self.velocity)
+        self._witnesses = 0
         self._section = section
         self._way = 0.0
         self._earlier = np.zeros((2, 2))
@@ -181,39 +187,40 @@ class ContextForecast:
         self._section = np.concatenate([self._section[-self._parameters.window + 1 :], self._carried[None]])
         self._way += float(np.hypot(*(self._carried - before)))
         self.velocity = drift(self._section[-6:])[1] if self.guides else self.velocity
+        self._ahead = self._course(self._steady, self._ahead)
+        self._steady = self._steady + self._speed * self._ahead
         self.point = self._believed()
         self._spread()
         self._drop_diverging()
 
+    def _course(self, place: Floats, heading: Floats) -> Floats:
+        """Return a heading (2,) turned to the road at a place (2,), if forecasts follow roads."""
+        if not self._parameters.roads:
+            return heading
+        return np.asarray(course(*self._trajectories.table, place, heading))
+
     def _onward(self) -> Floats:
-        """Return (2,) the velocity without predictors.
+        """Return (2,) the velocity without predictors: as fast as before, along the road.
 
         Where a vehicle goes its newest points tell best, but not how fast: those of a predictor that went
         under something lag behind it.
         """
-        if len(self._section) <= HEADING or not self._witnesses:
-            return self._straight
-        speed = float(np.hypot(*drift(self._section)[1]))
-        return speed * unit(drift(self._section[-HEADING:])[1])
+        newest = HEADING if self._witnesses else len(self._section)
+        ahead = self._course(self._carried, unit(drift(self._section[-newest:])[1]))
+        return float(np.hypot(*drift(self._section)[1])) * ahead
 
     def _believed(self) -> Floats:
-        """Lead what the predictors show back to the straight line, as far as drivers differ anyway.
+        """Lead what the predictors show back to who keeps to the road at its speed, as far as drivers differ.
 
-        Along the line and across it that is the positive part of the estimator of James and Stein. Where the
-        way has once turned, the line says nothing any more.
+        Along the road and across it that is the positive part of the estimator of James and Stein.
         """
-        ahead = unit(self._straight)
-        self._turned |= bool(unit(self.velocity) @ ahead < SAME_WAY)
-        if self._turned:
-            return self._carried
         lead = self._tick - self._began
-        line = self._line + lead * self._straight
-        frame = np.array([ahead, [-ahead[1], ahead[0]]])
-        apart = frame @ (self._carried - line)
-        usual = self._growth.covariance(ahead, lead * float(np.hypot(*self._straight)), lead)
+        frame = np.array([self._ahead, [-self._ahead[1], self._ahead[0]]])
+        apart = frame @ (self._carried - self._steady)
+        usual = self._growth.covariance(self._ahead, lead * self._speed, lead)
         chance = self._parameters.doubt**2 * np.diag(frame @ usual @ frame.T) / max(self._witnesses, 1)
         share = np.maximum(1.0 - chance / np.maximum(apart**2, 1e-9), 0.0)
-        return np.asarray(line + (share * apart) @ frame)
+        return np.asarray(self._steady + (share * apart) @ frame)
 
     def _place(self, guide: Guide, lead: int) -> Floats:
         """Return (2,) where a predictor is by a line through its last points: less noise, no lag."""

@@ -275,6 +275,30 @@ def test_without_predictors_it_goes_straight_on():
     assert (np.diff(spreads) > 0).all()
 
 
+def test_without_predictors_all_last_points_tell_where_it_goes():
+    known, rng = Trajectories(), np.random.default_rng(4)
+    for tick in range(40):
+        known.append(5, tick, np.array([2.0 * tick, 1.0]) + rng.normal(0, 1.0, 2))
+    forecast, straight = ContextForecast(known, 5), LinearForecast(known, 5)
+    forecast.step(40)
+    assert forecast.velocity == pytest.approx(straight.velocity, abs=1e-9)
+
+
+@pytest.mark.parametrize("roads", [True, False])
+def test_without_predictors_it_follows_the_road_that_oncoming_traffic_shows(roads):
+    known = Trajectories()
+    for tick in range(-200, 56):
+        for track, lead in enumerate((0, 40), 1):
+            known.append(track, tick, _bend(60 - tick - lead) + np.array([6.0, -6.0]))
+        if tick >= 0:
+            known.append(9, tick, _bend(tick))
+    forecast = ContextForecast(known, 9, parameters=ContextParameters(roads=roads))
+    forecast.step(115)
+    assert forecast.guides == []
+    off = np.hypot(*(forecast.point - _bend(115)))
+    assert off < 15.0 if roads else off > 50.0
+
+
 def test_one_that_brakes_by_itself_says_little_and_many_say_much():
     off = {}
     for count in (1, 6):
