@@ -25,7 +25,6 @@ from sim.textures import texture_array
 from sim.world import SKY_ID, Lighting, WorldState
 
 _ROOM = 8192  # instances and draws in a frame
-
 _SHADOW_REACH = 120.0  # metres within which bodies cast shadows, for a camera near the ground
 _SHADOW_ALOFT = 2.2  # camera heights within which they do, for one in the air
 _SHADOW_WIDEN = 2.5  # half-widths of the frame within which they do
