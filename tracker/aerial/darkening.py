@@ -36,7 +36,8 @@ EDGE = 7
 """Side of the neighbourhood, px, in which a shadow may be uneven."""
 FADING = 0.98
 BRIGHTER, BLACKER, COLOURED = 1.15, 0.2, 0.15
-"""Ratio to the background, ratio below that of shadows, and excess of green, that shadows never have."""
+"""Ratio to the background, ratio below that of shadows, and excess of green (half of that of blue), that
+shadows never have."""
 DARKER, OFF_TINT = 0.1, 0.12
 """How much darker than the learnt one a shadow may be, and how far off its tint; its rim is brighter."""
 
