@@ -40,6 +40,7 @@ class Background:
         view: (x0, y0, x1, y1) of the last picture in the window.
         laid: (h, w, 3) the last picture in the mosaic, cut to ``view``.
         valid: (h, w) where it has anything.
+        ground: (h, w, 3) the background image of the view, as it was before that picture.
         low: (h, w, 3) the darkest of the background about each pixel of the view.
         high: Likewise the brightest.
     """
@@ -82,8 +83,9 @@ class Background:
         for box in np.round(kept - np.tile(here, 2)).astype(int).tolist():
             protected[max(box[1], 0) : max(box[3], 0), max(box[0], 0) : max(box[2], 0)] = True
         part = np.s_[y0:y1, x0:x1]
-        mean = np.ascontiguousarray(self._mean[part])
-        self.low, self.high = cv2.erode(mean, NEIGHBOURS), cv2.dilate(mean, NEIGHBOURS)
+        # Rounded to the nearest.
+        self.ground = (self._mean[part] + np.float32(0.5)).astype(np.uint8)
+        self.low, self.high = cv2.erode(self.ground, NEIGHBOURS), cv2.dilate(self.ground, NEIGHBOURS)
         return np.asarray(
             _compare(
                 self.laid,
@@ -98,11 +100,6 @@ class Background:
                 self._rivals[part],
             )
         )
-
-    def picture(self) -> NDArray[np.uint8]:
-        """Return (h, w, 3) the background image of the view."""
-        x0, y0, x1, y1 = self.view
-        return np.asarray(np.round(self._mean[y0:y1, x0:x1]).astype(np.uint8))
 
     def mean(self, part: tuple[slice, slice]) -> NDArray[np.float32]:
         """Return (h, w, 3) the background of a part of the view."""
@@ -164,11 +161,11 @@ def _compare(laid, valid, protected, low, high, mean, spread, support, rival, ri
                     mean[i, j, c] = laid[i, j, c]
                 support[i, j] = 1
                 continue
-            most, other = np.float32(0.0), np.float32(0.0)
+            most, other = np.int32(0), np.int32(0)
             for c in range(3):
-                now = np.float32(laid[i, j, c])
-                most = max(most, now - high[i, j, c], low[i, j, c] - now)
-                other = max(other, abs(now - np.float32(rival[i, j, c])))
+                now = np.int32(laid[i, j, c])
+                most = max(most, now - np.int32(high[i, j, c]), np.int32(low[i, j, c]) - now)
+                other = max(other, abs(now - np.int32(rival[i, j, c])))
             change = LEAST_CHANGE + DEVIATIONS * spread[i, j]
             if most <= change:
                 if support[i, j] < LATE:

@@ -52,11 +52,12 @@ def darkness(image, background, mask):  # type: ignore[no-untyped-def]
         mask: (H, W) bool, foreground.
 
     Returns:
-        (H, W, 4) float32, 0 outside: of a window's ratio to the background its mean, tint, excess of green,
-        and relative standard deviation.
+        (K, 4) float32 of the K pixels of the mask, row by row: of a window's ratio to the background its
+        mean, tint, excess of green, and relative standard deviation.
     """
     height, width = mask.shape
-    found = np.zeros((height, width, 4), np.float32)
+    found = np.empty((mask.sum(), 4), np.float32)
+    k = 0
     for y in range(height):
         for x in range(width):
             if not mask[y, x]:
@@ -84,7 +85,8 @@ def darkness(image, background, mask):  # type: ignore[no-untyped-def]
             tint = (blue - red) / mean
             first /= count
             spread = np.sqrt(max(second / count - first * first, 0.0)) / mean
-            found[y, x] = mean, tint, (green - 0.5 * (red + blue)) / mean, spread
+            found[k] = mean, tint, (green - 0.5 * (red + blue)) / mean, spread
+            k += 1
     return found
 
 
@@ -120,7 +122,7 @@ class Shadows:
         image: NDArray[np.uint8],
         background: NDArray[np.uint8],
         mask: NDArray[np.bool_],
-        bounds: tuple[NDArray[np.float32], NDArray[np.float32]],
+        bounds: tuple[NDArray[np.uint8], NDArray[np.uint8]],
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return (H, W) the foreground without shadows, and what of it is a vehicle for sure.
 
@@ -135,7 +137,7 @@ class Shadows:
         """
         at = np.nonzero(mask)
         labels = find_blobs(mask, 1).labels
-        ratios, tints, greens, spread = darkness(image, background, mask)[at].T
+        ratios, tints, greens, spread = darkness(image, background, mask).T
         grey = (ratios > DARKEST) & (ratios < BRIGHTEST) & (tints > REDDEST) & (tints < BLUEST)
         grey &= np.abs(greens) <= GREENEST
         likely = grey & (spread < UNEVEN)

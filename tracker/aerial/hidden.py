@@ -80,13 +80,13 @@ class HiddenVehicles:
         """
         left = []
         self._tick = tick
-        to_picture = inverse(to_mosaic)
         for track in self.tracks:
             assert track.forecast is not None
             track.forecast.step(tick)
             turn_to_velocity(track)
+        for track, visible in zip(self.tracks, self._visible(inverse(to_mosaic), begun), strict=True):
             belief = self._beliefs[track.id]
-            belief.miss(self._visible(track, to_picture, begun))
+            belief.miss(visible)
             self._unlikely[track.id] = self._unlikely[track.id] + 1 if belief.unseen < GIVEN_UP else 0
             if tick - track.since <= self._longest and self._unlikely[track.id] <= PATIENCE:
                 left.append(track)
@@ -97,18 +97,25 @@ class HiddenVehicles:
     def covariance(self, track: Track) -> Floats:
         """Return (2, 2) of a forecast, calibrated, px^2."""
         assert track.forecast is not None
-        scale = np.clip(self._calibration.scale(self._tick - track.since), *SCALES)
+        least, most = SCALES
+        scale = min(max(self._calibration.scale(self._tick - track.since), least), most)
         return np.asarray(scale * track.forecast.covariance)
 
-    def _visible(self, track: Track, to_picture: Floats, begun: Sequence[Track]) -> Floats:
-        """Return (K,) the chance that a hidden vehicle is in plain view at each offset of its belief."""
-        along, _ = deviations(track.heading, self.covariance(track))
-        places = track.centre + np.outer(OFFSETS * along, track.heading)
+    def _visible(self, to_picture: Floats, begun: Sequence[Track]) -> Floats:
+        """Return (N, K) the chance that each hidden vehicle is in plain view at the offsets of its belief."""
+        along = [deviations(track.heading, self.covariance(track))[0] for track in self.tracks]
+        headings = np.array([track.heading for track in self.tracks]).reshape(-1, 1, 2)
+        centres = np.array([track.centre for track in self.tracks]).reshape(-1, 1, 2)
+        places = centres + np.array(along).reshape(-1, 1, 1) * OFFSETS[:, None] * headings
         shown = transform(to_picture, places)
-        framed = ((shown > RIM) & (shown < self._size - RIM)).all(1)
+        framed = ((shown > RIM) & (shown < self._size - RIM)).all(-1)
+        lengths = np.array([track.size[0] for track in self.tracks])
         for other in begun:
-            framed &= np.hypot(*(places - other.centre).T) > AROUND * max(track.size[0], other.size[0])
-        return np.asarray(framed * self.occluders.visible(places, track.heading))
+            near = AROUND * np.maximum(lengths, other.size[0])
+            framed &= np.hypot(*np.moveaxis(places - other.centre, -1, 0)) > near[:, None]
+        ways = np.broadcast_to(headings, places.shape)
+        visible = self.occluders.visible(places.reshape(-1, 2), ways.reshape(-1, 2))
+        return np.asarray(framed * visible.reshape(framed.shape))
 
     def _forget(self, number: int) -> None:
         del self._unlikely[number], self._beliefs[number]

@@ -67,7 +67,7 @@ class CastShadows:
         """
         self._frame += 1
         bounds = background.low, background.high
-        lit, own = self._shadows.remove(background.laid, background.picture(), mask, bounds)
+        lit, own = self._shadows.remove(background.laid, background.ground, mask, bounds)
         lit, own = (_as_mask(cv2.morphologyEx(m.view(np.uint8), cv2.MORPH_OPEN, GRAIN)) for m in (lit, own))
         whole, dark = filled(mask), mask & ~lit
         usual = float(np.median(self._areas or [np.inf]))

@@ -73,7 +73,7 @@ def test_the_window_moves_and_remembers():
         assert not seen(at).any()
     origin = background.origin.copy()
     assert origin[0] > 0
-    assert (np.abs(background.picture().astype(int)[2:-2, 2:-2] - background.laid[2:-2, 2:-2]) < 2).all()
+    assert (np.abs(background.ground.astype(int)[2:-2, 2:-2] - background.laid[2:-2, 2:-2]) < 2).all()
     # What was seen a while ago is still in the window.
     assert not seen(300).any()
     assert (background.origin == origin).all()
