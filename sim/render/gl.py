@@ -12,22 +12,19 @@ from sim.camera import Camera, Pose
 from sim.render.antialias import smooth_edges
 from sim.render.context import check, context
 from sim.render.ground import MARGIN, cut, grain_texture, ground_texture, mark_table, vertex_layout
-from sim.render.instances import COMMAND, CONTACT, INSTANCE, Library, contacts, in_bands
+from sim.render.instances import COMMAND, CONTACT, INSTANCE, ROOM, Library, contacts, in_bands
 from sim.render.lamps import HALO, LIGHTS, Burning, LampPlan, halos, lights
 from sim.render.materials import material_table
 from sim.render.pool import PoolPass
 from sim.render.programs import program, set_uniforms
+from sim.render.shadows import HEIGHTS, KINDS, ShadowPass
 from sim.render.silhouettes import PLOT, SilhouettePass
 from sim.render.sky import HIGHEST, panorama, screen_grid
 from sim.render.types import Picture, Silhouettes, Stage
 from sim.render.view import look_matrix, view_matrices
 from sim.textures import texture_array
-from sim.world import SKY_ID, Lighting, WorldState
+from sim.world import SKY_ID, Bodies, Lighting, WorldState
 
-_ROOM = 8192  # instances and draws in a frame
-_SHADOW_REACH = 120.0  # metres within which bodies cast shadows, for a camera near the ground
-_SHADOW_ALOFT = 2.2  # camera heights within which they do, for one in the air
-_SHADOW_WIDEN = 2.5  # half-widths of the frame within which they do
 _BEAM = 44.0
 _BODY_LIGHTS = 4  # lamps that light bodies, of those that light the ground
 
@@ -36,8 +33,8 @@ class GlRenderer:
     """Draws the world of one stage.
 
     A frame is one pass over the geometry, with one sample at each pixel's centre, that writes colour,
-    identity and depth. Shadows are a mask that only the colours of the ground and of bridges read, the sky
-    and the glare of lamps are colour alone, and the stairs along edges are smoothed afterwards.
+    identity and depth. Shadows are a mask that only the colours read, the sky and the glare of lamps are
+    colour alone, and the stairs along edges are smoothed afterwards.
 
     Args:
         stage: What stands still.
@@ -124,20 +121,14 @@ class GlRenderer:
         bodies = self._stage.bodies(state)
         selection = in_bands(bodies, self._library.select(bodies, camera, pose), pose)
         commands = self._library.commands(selection.meshes)
-        casters = self._library.select(bodies, camera, pose, widen=_SHADOW_WIDEN, coarsest=True)
-        reach = max(_SHADOW_REACH, _SHADOW_ALOFT * float(pose.position[2]))
-        casters = in_bands(bodies, casters.within(bodies, pose, reach), pose)
-        shades = self._library.commands(casters.meshes)
         stretches = self._ground.select(camera, pose)
         view = view_matrices(camera, pose)
         burning = self._lamps.burning(bodies, camera, pose, streets=self._streets)
         self._instances.write(self._library.instances(bodies, selection, pose))
         self._commands.write(commands)
-        self._casters.write(self._library.instances(bodies, casters, pose))
-        self._caster_commands.write(shades)
         self._stretches.write(self._ground.stretches(stretches, pose))
         self._ground_commands.write(self._ground.commands(stretches))
-        self._shadow_pass(ctx, view, len(shades), pose)
+        self._shadow_pass(ctx, bodies, camera, pose)
         if self._pool is not None:
             self._light_up(self._pool.program, burning, pose, LIGHTS)
             self._light_up(self._body, burning, pose, _BODY_LIGHTS)
@@ -146,7 +137,7 @@ class GlRenderer:
         self._main_pass(ctx, view, (len(commands), len(stretches)), pose)
         self._contact_pass(ctx, view, contacts(state.vehicles, pose))
         self._sky_pass(ctx, camera, pose)
-        self._halo_pass(ctx, view, halos(burning, camera, night=self._stage.light.night)[:_ROOM])
+        self._halo_pass(ctx, view, halos(burning, camera, night=self._stage.light.night)[:ROOM])
 
     def _shine(self, lighting: Lighting) -> None:
         """Set the light of one tick."""
@@ -162,16 +153,9 @@ class GlRenderer:
                 u_shown=tuple(np.sqrt(sky)),
             )
 
-    def _shadow_pass(self, ctx: Any, view: dict[str, Any], draws: int, pose: Pose) -> None:
-        self._mask.use()
-        self._mask.clear()
-        sun = self._stage.light.sun
-        if sun[2] <= 0.05 or not self._stage.light.sun_colour.any():
-            return
-        ctx.enable_only(ctx.BLEND)
-        ctx.blend_func = ctx.ONE, ctx.ONE
-        set_uniforms(self._body_shadow, **view, u_sun=tuple(sun), u_ground=-float(pose.position[2]))
-        self._body_shadow_array.render_indirect(self._caster_commands, count=draws)
+    def _shadow_pass(self, ctx: Any, bodies: Bodies, camera: Camera, pose: Pose) -> None:
+        self._shadows.draw(ctx, self._library, bodies, camera, pose)
+        set_uniforms(self._body, u_slide=self._shadows.slide(camera, pose), u_ground=-float(pose.position[2]))
 
     def _main_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int], pose: Pose) -> None:
         self._target.use()
@@ -185,7 +169,7 @@ class GlRenderer:
         self._texture_array.use(0)
         self._grain.use(1)
         self._road.use(2)
-        self._mask_texture.use(3)
+        self._shadows.use(3)
         self._marks.use(5)
         self._body_array.render_indirect(self._commands, count=draws[0])
         self._paved_array.render_indirect(self._ground_commands, count=draws[1])
@@ -258,12 +242,10 @@ class GlRenderer:
         keep = self._keep
         self._vertices = keep(ctx.buffer(self._library.vertices.tobytes()))
         self._faces = keep(ctx.buffer(self._library.faces.tobytes()))
-        self._instances = keep(ctx.buffer(reserve=_ROOM * INSTANCE.itemsize, dynamic=True))
-        self._commands = keep(ctx.buffer(reserve=_ROOM * COMMAND.itemsize, dynamic=True))
-        self._casters = keep(ctx.buffer(reserve=_ROOM * INSTANCE.itemsize, dynamic=True))
-        self._caster_commands = keep(ctx.buffer(reserve=_ROOM * COMMAND.itemsize, dynamic=True))
-        self._resting = keep(ctx.buffer(reserve=_ROOM * CONTACT.itemsize, dynamic=True))
-        self._halos = keep(ctx.buffer(reserve=_ROOM * HALO.itemsize, dynamic=True))
+        self._instances = keep(ctx.buffer(reserve=ROOM * INSTANCE.itemsize, dynamic=True))
+        self._commands = keep(ctx.buffer(reserve=ROOM * COMMAND.itemsize, dynamic=True))
+        self._resting = keep(ctx.buffer(reserve=ROOM * CONTACT.itemsize, dynamic=True))
+        self._halos = keep(ctx.buffer(reserve=ROOM * HALO.itemsize, dynamic=True))
         chunks = len(self._ground.first)
         self._ground_vertices = keep(ctx.buffer(self._ground.vertices.tobytes()))
         self._ground_faces = keep(ctx.buffer(self._ground.faces.tobytes()))
@@ -279,9 +261,6 @@ class GlRenderer:
         )
         self._target = keep(ctx.framebuffer([colour, ids, distances], depth))
         self._over = keep(ctx.framebuffer([colour], depth))
-        self._mask_texture = keep(ctx.texture(size, 2))
-        self._mask_texture.repeat_x = self._mask_texture.repeat_y = False
-        self._mask = keep(ctx.framebuffer([self._mask_texture]))
 
     def _make_textures(self, ctx: Any) -> None:
         keep, light = self._keep, self._stage.light
@@ -309,14 +288,23 @@ class GlRenderer:
         keep, stage, light = self._keep, self._stage, self._stage.light
         night = ("NIGHT",) if light.night else ()
         shared = ("light", "lamps") if light.night else ("light",)
-        self._body_shadow = keep(program(ctx, "body", "mask", "SHADOW"))
-        self._body_shadow_array = self._bodies(ctx, self._body_shadow, self._casters)
+        self._shadows = keep(ShadowPass(ctx, self._size, light, self._vertices, self._faces))
         self._alone = keep(program(ctx, "body", "alone", "ALONE"))
-        plots = keep(ctx.buffer(reserve=_ROOM * PLOT.itemsize, dynamic=True))
-        alone = self._bodies(ctx, self._alone, self._instances, (plots, "4i 1i/i", "i_box", "i_first"))
+        plots = keep(ctx.buffer(reserve=ROOM * PLOT.itemsize, dynamic=True))
+        alone = keep(
+            ctx.vertex_array(
+                self._alone,
+                [
+                    (self._vertices, "3f 20x 1f", "in_position", "in_surface"),
+                    (self._instances, "3f 2f 3f 8x 2f/i", "i_position", "i_turn", "i_scale", "i_lean"),
+                    (plots, "4i 1i/i", "i_box", "i_first"),
+                ],
+                self._faces,
+            )
+        )
         buffers = self._instances, plots, self._commands
         self._silhouettes = keep(SilhouettePass(ctx, self._alone, alone, buffers, self._size))
-        self._body = keep(program(ctx, "body", "body", "COLOUR", *night, shared=shared))
+        self._body = keep(program(ctx, "body", "body", "COLOUR", KINDS, HEIGHTS, *night, shared=shared))
         self._body_array = keep(
             ctx.vertex_array(
                 self._body,
@@ -383,18 +371,5 @@ class GlRenderer:
                     (self._corners, "2f", "in_corner"),
                     (self._halos, "3f 1f 3f/i", "i_position", "i_radius", "i_colour"),
                 ],
-            )
-        )
-
-    def _bodies(self, ctx: Any, shader: Any, instances: Any, *more: tuple[Any, ...]) -> Any:
-        return self._keep(
-            ctx.vertex_array(
-                shader,
-                [
-                    (self._vertices, "3f 20x 1f", "in_position", "in_surface"),
-                    (instances, "3f 2f 3f 8x 2f/i", "i_position", "i_turn", "i_scale", "i_lean"),
-                    *more,
-                ],
-                self._faces,
             )
         )

@@ -41,6 +41,9 @@ CONTACT = np.dtype([("position", "<f4", 3), ("turn", "<f4", 2), ("half", "<f4", 
 SWITCH_FOCAL = 800.0
 """Pixels: the focal length for which models say at what distance a coarser mesh takes over."""
 
+ROOM = 8192
+"""Instances and draws in a frame."""
+
 _CONTACT_REACH = 90.0  # metres along the axis, for a camera near the ground
 _CONTACT_ALOFT = 2.2  # camera heights, for one in the air
 _NARROWEST_PX = 0.35

@@ -3,6 +3,8 @@ uniform sampler2DArray u_textures;
 uniform vec4 u_material[22];  // share of the body's colour, least reflection, more of it by the alpha, retro-reflection
 uniform float u_street;
 uniform sampler2D u_shadow;
+uniform mat4 u_slide;  // to clip space from where the ray from the sun goes on to the ground
+uniform float u_ground;  // height of the ground above the camera
 in vec3 v_at;
 in vec3 v_normal;
 in vec3 v_uv;
@@ -18,7 +20,6 @@ layout(location = 2) out float o_depth;
 #define HEAD_LAMP 7
 #define FACADE 13
 #define STREET_LAMP 16
-#define FIRST_VEHICLE 1048576u
 
 // What a face sends out by itself.
 vec3 glow(int surface, vec3 plain, float alpha) {
@@ -36,6 +37,17 @@ vec3 glow(int surface, vec3 plain, float alpha) {
     return sum;
 }
 
+// The share of the sun's light that arrives. On a bridge lie the shadows of what drives there; a vehicle is in
+// the shade of scenery that stands higher on the ray to the sun.
+float sunshine(vec3 normal) {
+    if (v_id < FIRST_VEHICLE)
+        return normal.z > 0.9 ? 1.0 - texelFetch(u_shadow, ivec2(gl_FragCoord.xy), 0).g : 1.0;
+    vec4 meets = u_slide * vec4(v_at, 1.0);
+    float highest = TALLEST * textureLod(u_shadow, 0.5 + 0.5 * meets.xy / meets.w, 0.0).b;
+    // The mask keeps heights to an eighth of a metre, and a bridge does not shade what stands on it.
+    return meets.w > 0.0 && highest > v_at.z - u_ground + 0.25 ? 0.0 : 1.0;
+}
+
 void main() {
     int surface = int(v_uv.z + 0.5);
     vec4 material = u_material[surface];
@@ -50,9 +62,7 @@ void main() {
     float up = 0.5 + 0.5 * normal.z;
     float shade = clamp(0.45 + 0.7 * v_height, 0.45, 1.0);  // less sky near the ground
     vec3 ambient = mix(0.18 * (u_sun_colour * max(u_sun.z, 0.0) + u_horizon), 0.35 * u_zenith + 0.65 * u_horizon, up);
-    // On a bridge lie the shadows of what drives there.
-    bool carries = v_id < FIRST_VEHICLE && normal.z > 0.9;
-    float sunlit = carries ? 1.0 - texelFetch(u_shadow, ivec2(gl_FragCoord.xy), 0).g : 1.0;
+    float sunlit = sunshine(normal);
     vec3 light = sunlit * u_sun_colour * max(dot(normal, u_sun), 0.0) + shade * ambient;
     vec3 mirror = reflect(view, normal);
     vec3 world = mix(0.12 * (u_sun_colour + u_horizon), sky(mirror.z), clamp(mirror.z * 11.0 + 0.55, 0.0, 1.0));

@@ -38,17 +38,21 @@ void main() {
 #ifdef SHADOW
 // The shadow on flat ground: slid along the sun's ray, down to the height of the ground below the camera, or to
 // that of the bridge on which a body stands.
+in uint i_id;
 uniform vec3 u_sun;
 uniform float u_ground;
 flat out vec2 v_falls;
+out float v_height;
 
 void main() {
     bool aloft = i_position.z > u_ground + 0.05;
     float floor_height = aloft ? i_position.z : u_ground;
     vec3 at = placed(in_position * i_scale);
-    at -= u_sun * (max(at.z - floor_height, 0.0) / u_sun.z);
+    float height = max(at.z - floor_height, 0.0);
+    at -= u_sun * (height / u_sun.z);
     gl_Position = u_clip * vec4(at, 1.0);
     v_falls = aloft ? vec2(0.0, 1.0) : vec2(1.0, 0.0);
+    v_height = aloft || i_id >= FIRST_VEHICLE ? 0.0 : height;
 }
 #endif
 
