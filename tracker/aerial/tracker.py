@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tracker.aerial import appearance, tracks
 from tracker.aerial.background import Background
+from tracker.aerial.daylight import Daylight
 from tracker.aerial.forecasts import WINDOW, Forecaster, leads_to
 from tracker.aerial.ghosts import contrast
 from tracker.aerial.hidden import HiddenVehicles
@@ -76,7 +77,7 @@ class AerialTracker:
         """Forget everything and get ready for an episode."""
         self._info = info
         self._stabiliser, self._background = Stabiliser(), Background()
-        self._shadows = CastShadows()
+        self._shadows, self._daylight = CastShadows(), Daylight()
         self._trajectories = Trajectories()
         self._tracks: list[Track] = []
         self._hidden = HiddenVehicles(self._forecaster, self._matcher, info.width, info.height, info.rate)
@@ -176,6 +177,7 @@ class AerialTracker:
     def _remember(self, image: NDArray[np.uint8], to_mosaic: Floats) -> None:
         """Keep paths and pictures of what is in full view."""
         to_picture = inverse(to_mosaic)
+        corner = self._background.origin + np.array(self._background.view[:2])
         whole = [track for track in self._tracks if track.whole and track.misses == 0 and track.hits > 3]
         for track in whole:
             if track.confirmed:
@@ -185,10 +187,10 @@ class AerialTracker:
                 turn = jacobian(to_picture, track.centre)
                 across = track.heading[::-1] * np.array([-1.0, 1.0])
                 half = 0.5 * track.size
-                picture = appearance.cut(
-                    image, middle, turn @ (half[0] * track.heading), turn @ (half[1] * across)
-                )
-                track.pictures.append(picture)
+                sides = half[0] * track.heading, half[1] * across
+                picture = appearance.cut(image, middle, *(turn @ side for side in sides))
+                ground = appearance.cut(self._background.ground, track.centre - corner, *sides)
+                track.pictures.append(self._daylight.restore(picture, ground))
         if whole:
             self._hidden.occluders.see(
                 np.array([track.centre for track in whole]), np.array([track.heading for track in whole])
