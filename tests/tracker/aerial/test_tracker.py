@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tracker.aerial import tracks
 from tracker.aerial.reacquisition import Fusion
 from tracker.aerial.tracker import AerialTracker
 from tracker.base import check_tracker
@@ -62,10 +63,10 @@ def ids_in_lanes(tracker: AerialTracker, frames: list[np.ndarray]) -> tuple[Lane
     after: Lanes = {}
     tracker.start(INFO)
     for k, image in enumerate(frames):
-        tracks = tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+        shown = tracker.step(Frame(image=image, tick=k, time=k / 30.0))
         y0 = 20 + 5 * np.cos(0.05 * k)
         x0 = 20 + 8 * np.sin(0.03 * k)
-        for number, box, status in zip(tracks.ids, tracks.boxes, tracks.status, strict=True):
+        for number, box, status in zip(shown.ids, shown.boxes, shown.status, strict=True):
             if status != Status.CONFIRMED:
                 continue
             x, y = 0.5 * (box[0] + box[2]) + x0, 0.5 * (box[1] + box[3]) + y0
@@ -106,10 +107,29 @@ def test_boxes_are_as_large_as_vehicles_though_blur_widens_what_is_seen(frames):
     tracker.start(INFO)
     for k, image in enumerate(frames[:80]):
         blurred = cv2.GaussianBlur(image, (5, 5), 1.2)
-        tracks = tracker.step(Frame(image=blurred, tick=k, time=k / 30.0))
-        boxes = tracks.boxes[tracks.status == Status.CONFIRMED]
+        shown = tracker.step(Frame(image=blurred, tick=k, time=k / 30.0))
+        boxes = shown.boxes[shown.status == Status.CONFIRMED]
         sizes.extend(boxes[:, 2:] - boxes[:, :2])
     assert np.abs(np.median(sizes, 0) - [22.0, 10.0]).max() < 1.2, np.median(sizes, 0)
+
+
+def test_a_vehicle_looks_in_the_shade_as_in_the_sun(frames):
+    tracker = AerialTracker()
+    tracker.start(INFO)
+    reds = {True: [], False: []}
+    for k, image in enumerate(frames[:80]):
+        # The shade lies still on the ground.
+        edge = 100 - round(20 + 8 * np.sin(0.03 * k))
+        image = image.copy()
+        image[:, edge:] = image[:, edge:] * 0.5
+        tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+        for track in tracker._tracks:
+            if track.pictures and track.hits % tracks.PICTURE_EVERY == 0:
+                shaded = track.centre[0] > 80
+                if abs(track.centre[0] - 80) > 15 and track.centre[1] < 70:
+                    reds[shaded].append(track.pictures[-1].max())
+    assert min(map(len, reds.values())) > 5
+    assert abs(np.median(reds[True]) - np.median(reds[False])) < 25
 
 
 def test_without_re_acquisition_they_are_new(frames):
@@ -128,8 +148,8 @@ def test_what_is_larger_than_any_lorry_is_no_vehicle(frames, monkeypatch):
             # The sun comes out on a field.
             image = image.copy()
             image[185:235, 40:140] = np.clip(image[185:235, 40:140].astype(int) + 60, 0, 255)
-        tracks = tracker.step(Frame(image=image, tick=k, time=k / 30.0))
-        largest.append((tracks.boxes[:, 2] - tracks.boxes[:, 0]).max(initial=0.0))
+        shown = tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+        largest.append((shown.boxes[:, 2] - shown.boxes[:, 0]).max(initial=0.0))
     assert max(largest) < 40.0
 
 

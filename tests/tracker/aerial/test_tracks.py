@@ -6,8 +6,9 @@ import numpy as np
 
 from tracker.aerial import tracks
 from tracker.aerial.appearance import PATCH
+from tracker.aerial.belief import OFFSETS, deviations
 from tracker.aerial.forecasts import LinearForecast
-from tracker.aerial.hidden import LONGEST, PATIENCE, HiddenVehicles
+from tracker.aerial.hidden import AROUND, LONGEST, PATIENCE, RIM, HiddenVehicles
 from tracker.aerial.measuring import Outlines
 from tracker.aerial.occluders import Occluders
 from tracker.aerial.reacquisition import Fusion
@@ -177,6 +178,34 @@ def test_who_should_be_seen_is_given_up_sooner_than_who_is_out_of_view():
         left["out of view"] += len(out_of_view.tracks)
     assert left["out of view"] == round(RATE * LONGEST)
     assert PATIENCE <= left["in view"] < PATIENCE + 40
+
+
+def test_where_each_hidden_vehicle_could_be_seen_is_what_it_is_by_itself():
+    vehicles = hide(driven(number=1), driven(number=2, y=300.0, speed=1.0), driven(number=3, y=460.0))
+    vehicles.tracks[1].size = np.array([60.0, 12.0])
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        vehicles.occluders.see(rng.uniform([0, 90], [640, 310], (160, 2)), [1.0, 0.0])
+    begun = [
+        tracks.begin(9, outlines((143.0, 104.0)), 0, 45),
+        tracks.begin(10, outlines((184.0, 300.0)), 0, 45),
+    ]
+    vehicles.step(45, np.eye(3), begun)
+    turned = vehicles.tracks[2]
+    turned.heading = np.array([0.0, 1.0])
+    found = vehicles._visible(np.eye(3), begun)
+    assert found.shape == (3, len(OFFSETS))
+    for track, chances in zip(vehicles.tracks, found, strict=True):
+        along, _ = deviations(track.heading, vehicles.covariance(track))
+        for offset, chance in zip(OFFSETS, chances, strict=True):
+            place = track.centre + offset * along * track.heading
+            seen = (place > RIM).all() and (place < [640 - RIM, 480 - RIM]).all()
+            for other in begun:
+                reach = AROUND * max(track.size[0], other.size[0])
+                seen = seen and np.hypot(*(place - other.centre)) > reach
+            assert chance == seen * vehicles.occluders.visible(place, track.heading)[0]
+    assert (found.max(1) > 0).tolist() == [True, True, False]
+    assert (found[:2].min(1) == 0).all()
 
 
 def test_cells_learn_way_by_way_where_vehicles_are_seen():
