@@ -76,8 +76,8 @@ def test_a_wall_shades_of_a_car_what_is_lower_than_the_ray_above_it(height, dark
 
 
 def test_where_the_ray_meets_the_ground_behind_the_camera_the_sun_shines():
-    # From above, against the sun's ray, at a car 7 m up: its ground point is behind the camera. The far ground,
-    # where a point behind would be taken to lie, is in the shade of a wall.
+    # From above, against the sun's ray, at a car 7 m up: its ground point is behind the camera. The far
+    # ground, where a point behind would be taken to lie, is in the shade of a wall.
     look = Pose.looking((20.0, -2.2, 10.0), yaw=np.arctan2(0.6, -0.48), pitch=-0.5)
     there, wall = car(17.5, 1.0, 7.0), bodies([(PILLAR, -15.0, 45.0, 0.0)], 2)
     wall = replace(wall, sizes=np.array([[100.0, 4.0, 40.0]]))
