@@ -30,9 +30,9 @@ FARTHEST = 0.0145
 # Rows below the horizon, as a share of the width, from which on a point that stands still in the picture is
 # no vehicle's.
 NEAR_ROWS = 0.11
-# Shares of a vehicle's width: a trace so far inside its sides is the vehicle's; so far outside it may be the
-# vehicle's edge or the background next to it.
-INNER, RIM = 0.05, 0.06
+# A trace so far inside a vehicle's sides, and no farther above it, is the vehicle's, as shares of its width and
+# height; one around it may be its edge, or the roof of one that is taller than its box, or the background.
+INNER, RIM = (0.05, 0.1), (-0.06, 0.75)
 # What speaks against a trace in no vehicle's box being a car's, as log odds.
 UNBOXED = 1.8
 # Bound of a trace's log odds: one that reaches it in a sure vehicle's box stays with that vehicle, in its box
@@ -153,7 +153,7 @@ class InCarTracker:
     def _label(self, traces: TraceSet, tracks: Tracks, scale: float) -> None:
         """Decide what each trace is, and fill the diagnostics."""
         owners = _in_boxes(traces, tracks, INNER)
-        rims = _in_boxes(traces, tracks, -RIM)
+        rims = _in_boxes(traces, tracks, RIM)
         near = self._nearby_evidence(traces, scale)
         cast = _at_feet(traces, tracks)
         labels = np.zeros(len(traces), np.uint8)
@@ -235,13 +235,14 @@ def _at_feet(traces: TraceSet, tracks: Tracks) -> NDArray[np.bool_]:
     return np.asarray((beside & (y > boxes[:, 3] - 0.1 * tall) & (y < boxes[:, 3] + 1.5 * tall)).any(1))
 
 
-def _in_boxes(traces: TraceSet, tracks: Tracks, margin: float) -> NDArray[np.int64]:
+def _in_boxes(traces: TraceSet, tracks: Tracks, margins: tuple[float, float]) -> NDArray[np.int64]:
     """Return (N,) the id of the track in whose box a trace lies, 0 for none; of several the nearest.
 
     Args:
         traces: N of them.
         tracks: Of the frame.
-        margin: What of a box is left out at each side, as a share of its width; negative adds to it.
+        margins: What of a box is left out at each side, as a share of its width, negative adds to it; and what
+            is added above, as a share of its height.
     """
     owners = np.zeros(len(traces), np.int64)
     if not len(tracks) or not len(traces):
@@ -249,8 +250,9 @@ def _in_boxes(traces: TraceSet, tracks: Tracks, margin: float) -> NDArray[np.int
     boxes = tracks.boxes
     wide, tall = boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]
     x, y = traces.x[:, None], traces.y[:, None]
-    inside = (x > boxes[:, 0] + margin * wide) & (x < boxes[:, 2] - margin * wide)
-    inside &= (y > boxes[:, 1] - 0.1 * tall) & (y < boxes[:, 3] + 0.08 * tall)
+    aside, above = margins
+    inside = (x > boxes[:, 0] + aside * wide) & (x < boxes[:, 2] - aside * wide)
+    inside &= (y > boxes[:, 1] - above * tall) & (y < boxes[:, 3] + 0.08 * tall)
     # A cluster much wider than the vehicle is something behind it.
     inside &= traces.width[:, None] < 1.3 * wide
     away = np.where(inside, np.abs(x - 0.5 * (boxes[:, 0] + boxes[:, 2])) / wide, np.inf)

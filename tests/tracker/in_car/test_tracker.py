@@ -43,17 +43,18 @@ Cases = (st.integers(0, 2**32 - 1), st.integers(0, 30), st.integers(0, 5))
 
 
 @settings(max_examples=100, deadline=None)
-@given(*Cases, st.sampled_from([INNER, -RIM]))
-def test_a_trace_belongs_to_the_nearest_of_the_boxes_it_lies_in(seed, count, boxes, margin):
+@given(*Cases, st.sampled_from([INNER, RIM]))
+def test_a_trace_belongs_to_the_nearest_of_the_boxes_it_lies_in(seed, count, boxes, margins):
     traces, tracks = drawn(seed, count, boxes)
+    aside, above = margins
     for found, x, y, width in zip(
-        _in_boxes(traces, tracks, margin), traces.x, traces.y, traces.width, strict=True
+        _in_boxes(traces, tracks, margins), traces.x, traces.y, traces.width, strict=True
     ):
         owners = []
         for identity, (x0, y0, x1, y1) in zip(tracks.ids, tracks.boxes, strict=True):
             wide, tall = x1 - x0, y1 - y0
-            within = x0 + margin * wide < x < x1 - margin * wide
-            if within and y0 - 0.1 * tall < y < y1 + 0.08 * tall and width < 1.3 * wide:
+            within = x0 + aside * wide < x < x1 - aside * wide
+            if within and y0 - above * tall < y < y1 + 0.08 * tall and width < 1.3 * wide:
                 owners.append((abs(x - 0.5 * (x0 + x1)) / wide, identity))
         assert found == (min(owners)[1] if owners else 0)
 
@@ -139,3 +140,25 @@ def test_a_trace_in_no_box_is_background():
     assert found is not None
     assert found.labels.tolist() == [Label.CAR, Label.BACKGROUND]
     assert found.owners.tolist() == [7, 0]
+
+
+@pytest.mark.parametrize(
+    ("above", "evidence", "label"),
+    [
+        (20.0, 1.5, Label.CAR),
+        (20.0, -1.5, Label.BACKGROUND),
+        (30.0, 1.5, Label.BACKGROUND),
+    ],
+)
+def test_above_a_low_box_the_points_say_whether_a_trace_is_a_roof(above, evidence, label):
+    tracker = InCarTracker()
+    tracker.start(Info(width=640, height=480, rate=30.0, intrinsics=None))
+    boxes = np.array([[100.0, 100, 140, 130]])
+    tracks = Tracks(ids=np.array([7]), boxes=boxes, status=np.array([Status.CONFIRMED], np.uint8))
+    points = tracker._points
+    points._add(np.array([[120.0, 100.0 - above]]))
+    points.age[:], points.evidence[:] = 30, evidence
+    for _ in range(30):
+        tracker._label(traces_at((120, 100 - above)), tracks, scale=1.0)
+    assert tracker.diagnostics.traces is not None
+    assert tracker.diagnostics.traces.labels.tolist() == [label]
