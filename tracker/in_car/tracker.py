@@ -30,8 +30,8 @@ FARTHEST = 0.0145
 # Rows below the horizon, as a share of the width, from which on a point that stands still in the picture is
 # no vehicle's.
 NEAR_ROWS = 0.11
-# A trace so far inside a vehicle's sides, and no farther above it, is the vehicle's, as shares of its width and
-# height; one around it may be its edge, or the roof of one that is taller than its box, or the background.
+# A trace so far inside a vehicle's sides, and no farther above it, is the vehicle's, as shares of its width
+# and height; one around it may be its edge, or the roof of one that is taller than its box, or background.
 INNER, RIM = (0.05, 0.1), (-0.06, 0.75)
 # What speaks against a trace in no vehicle's box being a car's, as log odds.
 UNBOXED = 1.8
@@ -241,8 +241,8 @@ def _in_boxes(traces: TraceSet, tracks: Tracks, margins: tuple[float, float]) ->
     Args:
         traces: N of them.
         tracks: Of the frame.
-        margins: What of a box is left out at each side, as a share of its width, negative adds to it; and what
-            is added above, as a share of its height.
+        margins: What of a box is left out at each side, as a share of its width, negative adds to it; and
+            what is added above, as a share of its height.
     """
     owners = np.zeros(len(traces), np.int64)
     if not len(tracks) or not len(traces):
