@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from sim.camera import Camera, Pose
 from sim.params import SensorParams
-from sim.render.types import Stage
+from sim.render.silhouettes import Drawn
+from sim.render.types import Picture, Silhouettes, Stage
 from sim.sensor import Sensor
 from sim.truth.boxes import frame_truth
 from sim.truth.types import FrameTruth
@@ -80,6 +81,18 @@ class Scene(Protocol):
         """Return what the car measures in a state."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """A tick that is being drawn; fields as in `Observation`."""
+
+    state: WorldState
+    camera: Camera
+    pose: Pose
+    odometer: Odometer | None
+    drawn: Drawn
+    timing_ms: dict[str, float]
+
+
 class Simulation:
     """Steps a scene and records what its camera sees.
 
@@ -115,16 +128,48 @@ class Simulation:
 
     def step(self, action: NDArray[np.float32] | None = None) -> Observation:
         """Advance one tick and observe it."""
+        asked = self._ask(action)
+        return self._record(asked, *self._see(asked))
+
+    def run(self, frames: int) -> Iterator[Observation]:
+        """Yield that many observations, one tick each; the next frame is drawn while one is worked on."""
+        if frames < 1:
+            return
+        asked = self._ask()
+        for _ in range(frames - 1):
+            seen, following = self._see(asked), self._ask()
+            yield self._record(asked, *seen)
+            asked = following
+        yield self._record(asked, *self._see(asked))
+
+    def _ask(self, action: NDArray[np.float32] | None = None) -> _Asked:
+        """Advance one tick and have it drawn."""
         clock = _Stopwatch()
         state = self.scene.step(action)
-        camera, pose = self.scene.camera, self.scene.pose(state)
+        camera, pose, odometer = self.scene.camera, self.scene.pose(state), self.scene.odometer(state)
         clock.lap("world")
-        picture, silhouettes = self._renderer.observe(state, camera, pose)
+        drawn = self._renderer.begin(state, camera, pose)
         clock.lap("render")
+        return _Asked(
+            state=state, camera=camera, pose=pose, odometer=odometer, drawn=drawn, timing_ms=clock.laps
+        )
+
+    def _see(self, asked: _Asked) -> tuple[Picture, Silhouettes]:
+        """Wait for what is being drawn."""
+        clock = _Stopwatch()
+        seen = self._renderer.finish(asked.drawn)
+        clock.lap("render")
+        asked.timing_ms["render"] += clock.laps["render"]
+        return seen
+
+    def _record(self, asked: _Asked, picture: Picture, silhouettes: Silhouettes) -> Observation:
+        """Pass what was drawn through the sensor, and tell what is true of it."""
+        clock = _Stopwatch()
+        state = asked.state
         speed = state.ego.speed if state.ego is not None else 0.0
         image = self._sensor.expose(picture, state.tick, speed, stops=state.handling.stops)
         clock.lap("sensor")
-        truth = frame_truth(state, picture, silhouettes, camera, pose)
+        truth = frame_truth(state, picture, silhouettes, asked.camera, asked.pose)
         clock.lap("truth")
         return Observation(
             tick=state.tick,
@@ -133,16 +178,11 @@ class Simulation:
             ids=picture.ids,
             depth=picture.depth,
             state=state,
-            pose=pose,
-            odometer=self.scene.odometer(state),
+            pose=asked.pose,
+            odometer=asked.odometer,
             truth=truth,
-            timing_ms=clock.laps,
+            timing_ms=asked.timing_ms | clock.laps,
         )
-
-    def run(self, frames: int) -> Iterator[Observation]:
-        """Yield that many observations, one tick each."""
-        for _ in range(frames):
-            yield self.step()
 
 
 class _Stopwatch:

@@ -18,7 +18,7 @@ from sim.render.materials import material_table
 from sim.render.pool import PoolPass
 from sim.render.programs import program, set_uniforms
 from sim.render.shadows import HEIGHTS, KINDS, ShadowPass
-from sim.render.silhouettes import PLOT, SilhouettePass
+from sim.render.silhouettes import PLOT, Drawn, SilhouettePass
 from sim.render.sky import HIGHEST, panorama, screen_grid
 from sim.render.types import Picture, Silhouettes, Stage
 from sim.render.view import look_matrix, view_matrices
@@ -101,18 +101,24 @@ class GlRenderer:
             check(ctx, "drawing silhouettes")
         return found
 
-    def observe(self, state: WorldState, camera: Camera, pose: Pose) -> tuple[Picture, Silhouettes]:
-        """Give what `render` and `silhouettes` give, in less time: they are drawn while this thread works."""
+    def begin(self, state: WorldState, camera: Camera, pose: Pose) -> Drawn:
+        """Ask for what `render` and `silhouettes` give; OpenGL draws while this thread goes on.
+
+        `finish` gives it, and has to before the next one is asked for.
+        """
         with context() as ctx:
             self._draw(ctx, state, camera, pose)
-            drawn = self._silhouettes.draw(ctx, self._library, state.vehicles, camera, pose)
-            rgba, ids, depth = self._read()
+            drawn: Drawn = self._silhouettes.draw(ctx, self._library, state.vehicles, camera, pose)
             check(ctx, "rendering")
-        colour = smooth_edges(rgba)
+        return drawn
+
+    def finish(self, drawn: Drawn) -> tuple[Picture, Silhouettes]:
+        """Give what was asked for last."""
         with context() as ctx:
+            rgba, ids, depth = self._read()
             found = self._silhouettes.count(ctx, drawn)
-            check(ctx, "drawing silhouettes")
-        return Picture(colour=colour, ids=ids, depth=depth), found
+            check(ctx, "rendering")
+        return Picture(colour=smooth_edges(rgba), ids=ids, depth=depth), found
 
     def _draw(self, ctx: Any, state: WorldState, camera: Camera, pose: Pose) -> None:
         """Ask OpenGL to draw the picture."""

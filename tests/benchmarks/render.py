@@ -66,12 +66,13 @@ def main() -> list[Line]:
                 views.append((state, scene.camera, scene.pose(state)))
         equal = []
         for view in views:
-            fast.observe(*view)
+            fast.finish(fast.begin(*view))
             slow.render(*view)
             picture = timed(times["GlRenderer.render"], fast.render, *view)
             other = timed(times["PbrRenderer.render"], slow.render, *view)
             timed(times["GlRenderer.silhouettes"], fast.silhouettes, *view)
-            timed(times["GlRenderer.observe"], fast.observe, *view)
+            drawn = timed(times["GlRenderer.begin"], fast.begin, *view)
+            timed(times["GlRenderer.finish"], fast.finish, drawn)
             timed(times["Sensor.expose"], sensor.expose, picture, view[0].tick, 20.0)
             equal.append(float(np.mean(picture.ids == other.ids)))
         for name in PASSES:

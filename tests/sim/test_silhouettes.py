@@ -91,7 +91,7 @@ def test_no_vehicles_no_silhouettes(renderer):
 def test_seen_with_the_picture_or_alone_it_is_the_same(renderer):
     for tick in range(0, 30, 10):
         pose = Pose.looking((0.3 * tick, -1.8, 1.2), yaw=0.02 * np.sin(tick), pitch=0.004)
-        picture, found = renderer.observe(state(tick), CAMERA, pose)
+        picture, found = renderer.finish(renderer.begin(state(tick), CAMERA, pose))
         other, alone_found = (
             renderer.render(state(tick), CAMERA, pose),
             renderer.silhouettes(state(tick), CAMERA, pose),
