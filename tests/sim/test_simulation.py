@@ -1,7 +1,5 @@
 """The simulation as a whole: determinism, and image motion held against the id and depth maps."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -31,33 +29,6 @@ def test_same_seed_same_pixels_other_seed_others():
         np.testing.assert_array_equal(a.truth.box_amodal, b.truth.box_amodal)
         assert a.odometer == b.odometer
     assert not np.array_equal(first[0].ids, other[0].ids)
-
-
-class Zooming(InCarScene):
-    """A scene whose camera zooms from tick to tick."""
-
-    def step(self, action=None):
-        state = super().step(action)
-        self.camera = replace(self.camera, focal=600.0 + 40.0 * state.tick)
-        return state
-
-
-def test_frames_that_are_drawn_ahead_are_those_of_single_steps():
-    params, recorded = InCarParams(), []
-    for ahead in (True, False):
-        scene = Zooming(params, seed=4, rate=RATE, seconds=1.0)
-        with Simulation(scene, params.sensor, seed=4) as simulation:
-            recorded.append(list(simulation.run(4)) if ahead else [simulation.step() for _ in range(4)])
-    assert [len(list(frames)) for frames in recorded] == [4, 4]
-    for one, other in zip(*recorded, strict=True):
-        assert one.tick == other.tick
-        assert one.odometer == other.odometer
-        np.testing.assert_array_equal(one.pose.position, other.pose.position)
-        for name in ("image", "ids", "depth"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        for name in ("ids", "box_amodal", "box_visible", "visible_px", "amodal_px"):
-            np.testing.assert_array_equal(getattr(one.truth, name), getattr(other.truth, name))
-        assert set(one.timing_ms) == {"world", "render", "sensor", "truth"}
 
 
 @pytest.mark.parametrize("curved", [False, True])

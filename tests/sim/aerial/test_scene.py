@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,31 @@ def run(params: AerialParams, seed: int, frames: int):
     scene = AerialScene(params, seed=seed, rate=30, seconds=2.0)
     with Simulation(scene, params.sensor, seed=seed) as simulation:
         return scene, list(simulation.run(frames))
+
+
+class Zooming(AerialScene):
+    """A scene whose camera zooms from tick to tick."""
+
+    def step(self, action=None):
+        state = super().step(action)
+        self.camera = replace(self.camera, focal=400.0 + 20.0 * state.tick)
+        return state
+
+
+def test_frames_that_are_drawn_ahead_are_those_of_single_steps():
+    recorded = []
+    for ahead in (True, False):
+        scene = Zooming(PLAIN, seed=4, rate=30, seconds=2.0)
+        with Simulation(scene, PLAIN.sensor, seed=4) as simulation:
+            recorded.append(list(simulation.run(4)) if ahead else [simulation.step() for _ in range(4)])
+    assert len(recorded[0]) == 4
+    for one, other in zip(*recorded, strict=True):
+        assert one.tick == other.tick
+        np.testing.assert_array_equal(one.pose.position, other.pose.position)
+        for name in ("image", "ids", "depth"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        for name in ("ids", "box_amodal", "box_visible", "visible_px", "ground_to_image"):
+            np.testing.assert_array_equal(getattr(one.truth, name), getattr(other.truth, name))
 
 
 @pytest.fixture(scope="module")
