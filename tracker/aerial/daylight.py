@@ -21,6 +21,10 @@ MEMORY = 200
 """Grounds whose median is the usual one."""
 SHADE = 0.8
 """Share of the usual light below which ground is in the shade."""
+AROUND = 7
+"""Side, px, of the ground whose mean tells whether a place is in the shade: lines are narrower."""
+LUMA = np.array([0.299, 0.587, 0.114])
+"""Weights of red, green and blue in grey."""
 DARKEST = 0.3
 """Least share of a channel's usual light that is made up for."""
 
@@ -30,6 +34,12 @@ class Daylight:
 
     def __init__(self) -> None:
         self._grounds: deque[Floats] = deque(maxlen=MEMORY)
+
+    def shade(self, ground: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Return (H, W) where a background image (H, W, 3) lies in the shade, none before light is learnt."""
+        usual = float(LUMA @ self._usual()) if self._grounds else 0.0
+        grey = cv2.blur(cv2.cvtColor(ground, cv2.COLOR_RGB2GRAY), (AROUND, AROUND))
+        return np.asarray(grey < SHADE * usual)
 
     def restore(self, picture: Floats, ground: Floats) -> Floats:
         """Return a picture as it would be in the usual light, which is learnt.
@@ -43,8 +53,12 @@ class Daylight:
         """
         cells = ground.reshape(*PATCH, 3)
         self._grounds.append(np.median(cells, axis=(0, 1)))
-        usual = np.maximum(np.median(np.array(self._grounds), axis=0), 1.0)
+        usual = np.maximum(self._usual(), 1.0)
         share = cv2.blur(cells, (3, 3), borderType=cv2.BORDER_REPLICATE) / usual
         dark = share.mean(2, keepdims=True) < SHADE
         gain = np.where(dark, 1.0 / np.maximum(share, DARKEST), 1.0)
         return np.minimum(picture * gain.reshape(-1), 255.0)
+
+    def _usual(self) -> Floats:
+        """Return (3,) the usual colour of the ground below vehicles."""
+        return np.asarray(np.median(np.array(self._grounds), axis=0))

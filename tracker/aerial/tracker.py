@@ -108,7 +108,8 @@ class AerialTracker:
         """Measure the tracks, begin new ones; return the boxes (M, 4) of all outlines in the picture."""
         kept = _box(_corners([track for track in self._tracks if track.went()]))
         mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
-        blobs = find_blobs(self._shadows.take_off(self._background, mask), LEAST_AREA // 2)
+        shade = self._daylight.shade(self._background.ground)
+        blobs = find_blobs(self._shadows.take_off(self._background, mask, shade), LEAST_AREA // 2)
         origin = self._background.origin + np.array(self._background.view[:2])
         places = np.array([track.state[:, 0] for track in self._tracks]).reshape(-1, 2) - origin
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
