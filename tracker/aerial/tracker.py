@@ -135,8 +135,10 @@ class AerialTracker:
                     bool(cut[k]),
                     self._usual * LARGEST,
                 )
-        # Two tracks were on one vehicle.
-        self._tracks = [track for track, gone in zip(self._tracks, beaten, strict=True) if not gone]
+        # Two tracks were on one vehicle; two that are known may have gone under a bridge side by side.
+        self._tracks = [
+            track for track, gone in zip(self._tracks, beaten, strict=True) if not gone or self._known(track)
+        ]
         missed = [track for track in self._tracks if track.misses]
         free.centres[:] += origin
         cut = self._cut_off(transform(to_picture, free.corners()))
@@ -210,14 +212,13 @@ class AerialTracker:
     def _hide(self) -> None:
         """End what was not found again; of what was a vehicle for sure a forecast is begun."""
         for track in self._tracks:
-            if (
-                track.misses >= tracks.MOST_MISSES
-                and track.confirmed
-                and track.hits >= LEAST_HISTORY
-                and track.path in self._trajectories
-            ):
+            if track.misses >= tracks.MOST_MISSES and self._known(track):
                 self._hidden.add(track, self._trajectories)
         self._tracks = [track for track in self._tracks if track.misses < tracks.MOST_MISSES]
+
+    def _known(self, track: Track) -> bool:
+        """Tell whether a track is a vehicle for sure, and can be forecast."""
+        return track.confirmed and track.hits >= LEAST_HISTORY and track.path in self._trajectories
 
     def _decide(self, to_mosaic: Floats) -> None:
         """Confirm new tracks, and give those that are hidden vehicles their ids back."""
