@@ -156,6 +156,20 @@ def test_where_shade_lies_no_shadows_are_taken_off(frames, monkeypatch):
     assert inside[:, 20:110].mean() < 0.05
 
 
+def test_hidden_vehicles_are_expected_in_their_lanes(frames):
+    tracker, found = AerialTracker(), []
+    tracker.start(INFO)
+    for k, image in enumerate(frames[:120]):
+        tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+        for track in tracker._hidden.tracks if k > 100 else []:
+            axes = np.array([track.heading, [-track.heading[1], track.heading[0]]])
+            usual, own = track.forecast.covariance, tracker._hidden.covariance(track)
+            found.append(np.diag(axes @ own @ axes.T) / np.diag(axes @ usual @ axes.T))
+    along, across = np.array(found).T
+    assert (along > 0.59).all()
+    assert np.median(across) < 0.45
+
+
 @pytest.mark.parametrize("settled", [True, False])
 def test_a_known_vehicle_that_loses_its_outline_to_another_one_is_hidden(frames, monkeypatch, settled):
     def beaten(*arguments):
