@@ -55,7 +55,7 @@ class CastShadows:
         """(2,) px of the mosaic from the edge of a usual vehicle to that of its shadow."""
         return self._sun.offset
 
-    def take_off(self, background: Background, mask: Mask, shade: Mask) -> Mask:
+    def take_off(self, background: Background, mask: Mask) -> Mask:
         """Return the foreground (H, W) of the last picture without the shadows, and learn where they fall.
 
         What is no darkened road is a vehicle's; so is what is foreground all along the offset from there. Of
@@ -65,12 +65,11 @@ class CastShadows:
         Args:
             background: With the last picture laid on it.
             mask: (H, W) foreground of its view.
-            shade: (H, W) where the ground is in the shade.
         """
         self._frame += 1
         bounds = background.low, background.high
         lit, own = self._shadows.remove(background.laid, background.ground, mask, bounds)
-        lit = lit | (mask & shade)
+        lit = lit | (mask & background.shade)
         lit, own = (_as_mask(cv2.morphologyEx(m.view(np.uint8), cv2.MORPH_OPEN, GRAIN)) for m in (lit, own))
         whole, dark = filled(mask), mask & ~lit
         usual = float(np.median(self._areas or [np.inf]))

@@ -76,8 +76,8 @@ class AerialTracker:
     def start(self, info: Info) -> None:
         """Forget everything and get ready for an episode."""
         self._info = info
-        self._stabiliser, self._background = Stabiliser(), Background()
-        self._shadows, self._daylight = CastShadows(), Daylight()
+        self._stabiliser, self._daylight = Stabiliser(), Daylight()
+        self._background, self._shadows = Background(self._daylight), CastShadows()
         self._trajectories = Trajectories()
         self._tracks: list[Track] = []
         self._hidden = HiddenVehicles(self._forecaster, self._matcher, info.width, info.height, info.rate)
@@ -108,8 +108,7 @@ class AerialTracker:
         """Measure the tracks, begin new ones; return the boxes (M, 4) of all outlines in the picture."""
         kept = _box(_corners([track for track in self._tracks if track.went()]))
         mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
-        shade = self._daylight.shade(self._background.ground)
-        blobs = find_blobs(self._shadows.take_off(self._background, mask, shade), LEAST_AREA // 2)
+        blobs = find_blobs(self._shadows.take_off(self._background, mask), LEAST_AREA // 2)
         origin = self._background.origin + np.array(self._background.view[:2])
         places = np.array([track.state[:, 0] for track in self._tracks]).reshape(-1, 2) - origin
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)

@@ -8,10 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tracker.aerial.appearance import PATCH
 from tracker.aerial.background import Background
+from tracker.aerial.daylight import Daylight
 from tracker.aerial.shadows import EVERY, CastShadows, filled, goes_on
 
 NONE = np.zeros((0, 4))
+PIXELS = 3 * PATCH[0] * PATCH[1]
 
 
 ROAD = np.array([110, 112, 114], np.uint8)
@@ -65,14 +68,15 @@ def _drive(frames, draw, shaded=slice(0, 0)):
     """
     ground = np.tile(ROAD, (120, 160, 1))
     ground[shaded] = SHADE
-    background, shadows = Background(), CastShadows()
+    daylight = Daylight()
+    daylight.restore(np.zeros(PIXELS), np.tile(ROAD, PIXELS // 3))
+    background, shadows = Background(daylight), CastShadows()
     for _ in range(12):
         background.apply(ground, np.eye(3), NONE)
     for k in range(frames):
         seen = ground.copy()
         draw(seen, 10 + k % 100)
-        mask = background.apply(seen, np.eye(3), NONE)
-        left = shadows.take_off(background, mask, (background.ground == SHADE).all(2))
+        left = shadows.take_off(background, background.apply(seen, np.eye(3), NONE))
     return shadows, left
 
 

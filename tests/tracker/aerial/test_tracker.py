@@ -138,8 +138,8 @@ def test_a_vehicle_looks_in_the_shade_as_in_the_sun(frames):
 def test_where_shade_lies_no_shadows_are_taken_off(frames, monkeypatch):
     shades = []
 
-    def spy(self, background, mask, shade):
-        shades.append(shade)
+    def spy(self, background, mask):
+        shades.append(background.shade)
         return mask
 
     monkeypatch.setattr("tracker.aerial.shadows.CastShadows.take_off", spy)
