@@ -57,9 +57,9 @@ class HiddenVehicles:
         self._calibration = Calibration(forecaster)
         self._size = np.array([width, height], float)
         self._longest = round(LONGEST * rate)
-        self._tick = 0
         self._unlikely: dict[int, int] = {}
         self._beliefs: dict[int, Belief] = {}
+        self._covariances: dict[int, Floats] = {}
 
     def rehearse(self, trajectories: Trajectories, tick: int, seen: list[int]) -> None:
         """Let the calibration learn from what is seen."""
@@ -80,11 +80,12 @@ class HiddenVehicles:
             begun: Tracks of which it is not yet decided who they are.
         """
         left = []
-        self._tick = tick
         for track in self.tracks:
             assert track.forecast is not None
             track.forecast.step(tick)
             turn_to_velocity(track)
+            lead = tick - track.since
+            self._covariances[track.id] = self._calibration.covariance(track.forecast, lead, SCALES)
         for track, visible in zip(self.tracks, self._visible(inverse(to_mosaic), begun), strict=True):
             belief = self._beliefs[track.id]
             belief.miss(visible)
@@ -96,9 +97,8 @@ class HiddenVehicles:
         self.tracks = left
 
     def covariance(self, track: Track) -> Floats:
-        """Return (2, 2) of a forecast, calibrated, px^2."""
-        assert track.forecast is not None
-        return self._calibration.covariance(track.forecast, self._tick - track.since, SCALES)
+        """Return (2, 2) of a forecast, calibrated, px^2, as of the last `step`."""
+        return self._covariances[track.id]
 
     def _visible(self, to_picture: Floats, begun: Sequence[Track]) -> Floats:
         """Return (N, K) the chance that each hidden vehicle is in plain view at the offsets of its belief."""
@@ -117,7 +117,7 @@ class HiddenVehicles:
         return np.asarray(framed * visible.reshape(framed.shape))
 
     def _forget(self, number: int) -> None:
-        del self._unlikely[number], self._beliefs[number]
+        del self._unlikely[number], self._beliefs[number], self._covariances[number]
 
     def reacquire(self, new: list[Track], to_mosaic: Floats) -> list[tuple[Track, Track]]:
         """Return pairs of a hidden track and the new one that is the same vehicle; the hidden are let go."""
