@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tracker.aerial import appearance, tracks
 from tracker.aerial.background import Background
 from tracker.aerial.daylight import Daylight
-from tracker.aerial.forecasts import WINDOW, Forecaster, leads_to
+from tracker.aerial.forecasts import WINDOW, Forecaster, leads_to, went_until
 from tracker.aerial.ghosts import contrast
 from tracker.aerial.hidden import HiddenVehicles
 from tracker.aerial.measuring import corners, free_outlines, outline
@@ -212,6 +212,8 @@ class AerialTracker:
         """End what was not found again; of what was a vehicle for sure a forecast is begun."""
         for track in self._tracks:
             if track.misses >= tracks.MOST_MISSES and self._known(track):
+                track.since = went_until(self._trajectories, track.path, float(track.size[0]))
+                self._trajectories.cut(track.path, track.since)
                 self._hidden.add(track, self._trajectories)
         self._tracks = [track for track in self._tracks if track.misses < tracks.MOST_MISSES]
 

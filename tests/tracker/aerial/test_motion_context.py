@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tracker.aerial import lyapunov
 from tracker.aerial.calibration import Calibration, quantile, scale
-from tracker.aerial.forecasts import Growth, KalmanForecast, LinearForecast, leads_to
+from tracker.aerial.forecasts import Growth, KalmanForecast, LinearForecast, leads_to, went_until
 from tracker.aerial.motion_context import PRINTED, ContextForecast, ContextParameters
 from tracker.aerial.regression import affine, carry, similarity
 from tracker.aerial.trajectories import Trajectories
@@ -259,6 +259,29 @@ def test_a_place_straight_ahead():
     assert leads_to(known, 1, np.array([300.0, 200.0]))
     assert not leads_to(known, 1, np.array([300.0, 300.0]))
     assert not leads_to(known, 1, np.array([0.0, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("going", "speed", "standing", "creeping", "until"),
+    [
+        (60, 1.5, 40, 0.05, 53),  # Ten px before the end: eight of them at its speed.
+        (60, 1.5, 0, 0.0, 59),
+        (60, 1.5, 40, 0.75, 99),  # It braked.
+        (60, 0.05, 40, 0.05, 99),  # It always crept.
+        (20, 1.5, 40, 0.05, 59),  # Too short to tell its speed.
+    ],
+)
+def test_who_stands_at_the_end_of_its_path_had_gone_before(going, speed, standing, creeping, until):
+    known = Trajectories()
+    steps = np.append(np.full(going, speed), np.full(standing, creeping))
+    for tick, way in enumerate(np.cumsum(steps)):
+        known.append(1, tick, np.array([100.0 + way, 50.0]))
+    assert went_until(known, 1, 20.0) == until
+    known.cut(1, until)
+    assert known.extent(1) == (0, until)
+    np.testing.assert_allclose(known.at(1, [until])[0], [100.0 + steps[: until + 1].sum(), 50.0])
+    known.append(1, until + 2, np.array([500.0, 50.0]))
+    assert known.extent(1) == (0, until + 2)
 
 
 def test_without_predictors_it_goes_straight_on():
