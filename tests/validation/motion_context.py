@@ -127,9 +127,9 @@ def hide(ways: Ways, *, seed: int = 0, frames: int = max(LEADS)) -> list[Event]:
             for name, forecast in models[vehicle].items():
                 forecast.step(tick)
                 apart = truth - forecast.point
-                measure = float(apart @ np.linalg.solve(forecast.covariance, apart))
-                limits = calibrations[name].scale(tick - since) * quantile(SHARES)
-                found[name].append(np.array([np.hypot(*apart), *(measure <= limits)]))
+                covariance = calibrations[name].covariance(forecast, tick - since)
+                measure = float(apart @ np.linalg.solve(covariance, apart))
+                found[name].append(np.array([np.hypot(*apart), *(measure <= quantile(SHARES))]))
             guides[vehicle].append(len(models[vehicle]["context"].guides))
             if tick == since + frames:
                 turned = _turns(way[since - begin : tick - begin + 1])

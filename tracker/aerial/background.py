@@ -14,12 +14,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from tracker.aerial.daylight import Daylight
 from tracker.aerial.stabilisation import Floats, transform
 
 MARGIN = 192
 """Px of the mosaic around a view that are kept."""
 LEAST_CHANGE = 8.0
-"""Grey levels of a channel that are always noise."""
+"""Grey levels of a channel that are always noise ..."""
+LEAST_IN_SHADE = 5.0
+"""... where the ground is in the shade: all there is fainter by as much as the light is."""
 DEVIATIONS = 2.5
 """Usual deviations that are noise."""
 NEIGHBOURS = np.ones((3, 3), np.uint8)
@@ -43,9 +46,16 @@ class Background:
         ground: (h, w, 3) the background image of the view, as it was before that picture.
         low: (h, w, 3) the darkest of the background about each pixel of the view.
         high: Likewise the brightest.
+        shade: (h, w) where that background is in the shade.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, daylight: Daylight | None = None) -> None:
+        """Begin with nothing known.
+
+        Args:
+            daylight: What is known of the usual light; None is nothing.
+        """
+        self._daylight = daylight or Daylight()
         self.origin = np.zeros(2)
         self._mean = np.zeros((0, 0, 3), np.float32)
 
@@ -86,6 +96,7 @@ class Background:
         # Rounded to the nearest.
         self.ground = (self._mean[part] + np.float32(0.5)).astype(np.uint8)
         self.low, self.high = cv2.erode(self.ground, NEIGHBOURS), cv2.dilate(self.ground, NEIGHBOURS)
+        self.shade = self._daylight.shade(self.ground)
         return np.asarray(
             _compare(
                 self.laid,
@@ -98,6 +109,7 @@ class Background:
                 self._support[part],
                 self._rival[part],
                 self._rivals[part],
+                self.shade,
             )
         )
 
@@ -148,7 +160,7 @@ class Background:
 
 
 @njit(cache=True)
-def _compare(laid, valid, protected, low, high, mean, spread, support, rival, rivals):  # type: ignore[no-untyped-def]
+def _compare(laid, valid, protected, low, high, mean, spread, support, rival, rivals, shade):  # type: ignore[no-untyped-def]
     """Return the foreground (h, w) and learn in place; see `Background`."""
     height, width = valid.shape
     found = np.zeros((height, width), np.bool_)
@@ -166,7 +178,8 @@ def _compare(laid, valid, protected, low, high, mean, spread, support, rival, ri
                 now = np.int32(laid[i, j, c])
                 most = max(most, now - np.int32(high[i, j, c]), np.int32(low[i, j, c]) - now)
                 other = max(other, abs(now - np.int32(rival[i, j, c])))
-            change = LEAST_CHANGE + DEVIATIONS * spread[i, j]
+            least = LEAST_IN_SHADE if shade[i, j] else LEAST_CHANGE
+            change = least + DEVIATIONS * spread[i, j]
             if most <= change:
                 if support[i, j] < LATE:
                     support[i, j] += 1

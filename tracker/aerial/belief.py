@@ -16,7 +16,9 @@ Floats = NDArray[np.float64]
 OFFSETS: Floats = np.linspace(-3.2, 3.2, 33)
 """Standard deviations along the way, forward positive."""
 FREEDOM = 4.0
-"""Degrees of Student's distribution of offsets: drivers brake hard, too."""
+"""Degrees of Student's distribution of offsets: drivers brake hard, and change lanes, too."""
+LANE = 8.0 / 3.0
+"""One over the greatest density of that distribution with a scale of 1."""
 PRIOR: Floats = (1.0 + OFFSETS**2 / FREEDOM) ** (-0.5 * (FREEDOM + 1.0))
 PRIOR /= PRIOR.sum()
 DETECTION = 0.5
@@ -65,8 +67,8 @@ class Belief:
         # Between two offsets it may be anywhere.
         width = STEP * along
         near = np.exp(-0.5 * ((ahead[:, None] - along * OFFSETS) / width) ** 2) @ (self.weights / self.unseen)
-        lane = -0.5 * (beside / across) ** 2 - np.log(2.0 * np.pi * across * width)
-        return np.asarray(np.log(near + 1e-12) + lane)
+        lane = -0.5 * (FREEDOM + 1.0) * np.log1p((beside / across) ** 2 / FREEDOM)
+        return np.asarray(np.log(near + 1e-12) + lane - np.log(LANE * across * np.sqrt(2.0 * np.pi) * width))
 
 
 def deviations(heading: Floats, covariance: Floats) -> tuple[float, float]:

@@ -1,14 +1,19 @@
-"""How far to trust a forecast: vehicles that are seen are forecast as if they were hidden, and compared."""
+"""How far to trust a forecast: vehicles that are seen are forecast as if they were hidden, and compared.
+
+Along the way and across it that is learnt apart: most keep to their lanes, whatever their speed.
+"""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tracker.aerial.forecasts import Forecast, Forecaster
+from tracker.aerial.forecasts import Forecast, Forecaster, unit
 from tracker.aerial.trajectories import Trajectories
 
 Floats = NDArray[np.float64]
@@ -17,11 +22,14 @@ LEADS = (10, 20, 40, 60)
 """Frames after which a rehearsal is compared with the truth."""
 SHARES = (0.5, 0.95)
 """Shares of the truth that are to lie inside the ellipses of these shares."""
+SQUARES = np.array([NormalDist().inv_cdf(0.5 + 0.5 * share) ** 2 for share in SHARES])
+"""Squared distances, in variances, inside which these shares of a Gaussian on a line lie."""
 MEMORY = 60
 """Rehearsals that are remembered."""
 BELIEF = 10
 """Rehearsals that the growth as it is set counts for."""
 LEAST, MOST = 0.1, 10.0
+IDENTITY = np.eye(2)
 
 
 def quantile(share: ArrayLike) -> Floats:
@@ -58,8 +66,8 @@ class Calibration:
         """
         self._forecaster, self._every = forecaster, every
         self._running: list[Rehearsal] = []
-        self._measures: dict[int, deque[float]] = {lead: deque(maxlen=MEMORY) for lead in LEADS}
-        self._scales = np.ones(len(LEADS))
+        self._squares: dict[int, deque[Floats]] = {lead: deque(maxlen=MEMORY) for lead in LEADS}
+        self._scales = np.ones((LEADS[-1] + 1, 2))
         self._turn = 0
 
     def step(self, trajectories: Trajectories, tick: int, seen: list[int]) -> None:
@@ -74,12 +82,16 @@ class Calibration:
         for rehearsal in self._running:
             rehearsal.forecast.step(tick)
             lead = tick - rehearsal.since
-            if lead in self._measures and rehearsal.track in visible:
+            if lead in self._squares and rehearsal.track in visible:
                 apart = trajectories.at(rehearsal.track, [tick])[0] - rehearsal.forecast.point
-                measure = float(apart @ np.linalg.solve(rehearsal.forecast.covariance, apart))
-                self._measures[lead].append(measure)
+                along = unit(rehearsal.forecast.velocity)
+                axes = np.array([along, [-along[1], along[0]]])
+                variances = np.diag(axes @ rehearsal.forecast.covariance @ axes.T)
+                self._squares[lead].append((axes @ apart) ** 2 / variances)
         if tick % self._every == 0:
-            self._scales = np.array([scale(measures) for measures in self._measures.values()])
+            scales = np.array([scale(squares) for squares in self._squares.values()])
+            leads = np.arange(LEADS[-1] + 1)
+            self._scales = np.column_stack([np.interp(leads, LEADS, axis) for axis in scales.T])
         self._running = [r for r in self._running if tick - r.since < LEADS[-1] and r.track in visible]
         busy = {rehearsal.track for rehearsal in self._running}
         free = [track for track in seen if track not in busy]
@@ -89,19 +101,31 @@ class Calibration:
             self._turn = track
             self._running.append(Rehearsal(track, tick, self._forecaster(trajectories, track)))
 
-    def scale(self, lead: int) -> float:
-        """Return the factor for covariances of forecasts ``lead`` frames ahead."""
-        return float(np.interp(lead, LEADS, self._scales))
+    def covariance(
+        self, forecast: Forecast, lead: int, bounds: Sequence[ArrayLike] = (LEAST, MOST)
+    ) -> Floats:
+        """Return (2, 2) of a forecast ``lead`` frames ahead, calibrated, px^2.
+
+        Args:
+            forecast: Advanced to there.
+            lead: Frames.
+            bounds: Least and greatest factors of the variances; of those along the way and across it, (2, 2).
+        """
+        least, most = bounds
+        along, across = np.sqrt(np.minimum(np.maximum(self._scales[min(lead, LEADS[-1])], least), most))
+        heading = unit(forecast.velocity)
+        stretch = across * IDENTITY + (along - across) * heading * heading[:, None]
+        return np.asarray(stretch @ forecast.covariance @ stretch)
 
 
-def scale(measures: ArrayLike) -> float:
-    """Return the factor that puts the wanted shares of squared distances (K,) inside the ellipses.
+def scale(squares: ArrayLike) -> Floats:
+    """Return the factors (2,) that put the wanted shares of squared distances (K, 2) inside, axis by axis.
 
-    The shares are traded off evenly; where few distances are known the factor is near 1.
+    The shares are traded off evenly; where few distances are known the factors are near 1.
     """
-    measures = np.asarray(measures, float)
-    if not len(measures):
-        return 1.0
-    ratios = np.log(np.maximum(np.quantile(measures, SHARES), 1e-9) / quantile(SHARES))
-    trust = len(measures) / (len(measures) + BELIEF)
-    return float(np.clip(np.exp(trust * ratios.mean()), LEAST, MOST))
+    squares = np.asarray(squares, float).reshape(-1, 2)
+    if not len(squares):
+        return np.ones(2)
+    ratios = np.log(np.maximum(np.quantile(squares, SHARES, axis=0), 1e-9) / SQUARES[:, None])
+    trust = len(squares) / (len(squares) + BELIEF)
+    return np.asarray(np.clip(np.exp(trust * ratios.mean(0)), LEAST, MOST))

@@ -19,6 +19,10 @@ WINDOW = 30
 STRAIGHT = 0.99
 """Cosine of the angle between two ways above which the road between them is straight."""
 
+LINGER, BRAKED = 0.5, 0.4
+"""Lengths from a path's end within which a track may have come to a standstill, and the share of its speed
+before that below which it did."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Growth:
@@ -102,6 +106,29 @@ def leads_to(trajectories: Trajectories, track: int, place: Floats) -> bool:
     section, _ = last_section(trajectories, track, WINDOW)
     end, velocity = drift(section)
     return bool(unit(velocity) @ unit(place - end) > STRAIGHT)
+
+
+def went_until(trajectories: Trajectories, track: int, length: float) -> int:
+    """Return the last tick at which a track whose path ends in the picture was on its vehicle.
+
+    What stands does not go out of sight. Where a path comes to a standstill before it ends, its vehicle has
+    gone on below something, and what came after it, or the rest of a lorry, was taken for it.
+
+    Args:
+        trajectories: With the track in them.
+        track: Id.
+        length: Of the vehicle, px.
+    """
+    first, last = trajectories.extent(track)
+    points = trajectories.at(track, np.arange(first, last + 1))
+    left = np.hypot(*(points - points[-1]).T)
+    away = np.flatnonzero(left > LINGER * length)
+    if not len(away) or away[-1] < WINDOW:
+        return last
+    near = int(away[-1])
+    usual = float(np.hypot(*(points[near] - points[near - WINDOW]))) / WINDOW
+    lingering = float(left[near]) / (last - first - near) < BRAKED * usual
+    return first + near if lingering else last
 
 
 class LinearForecast:

@@ -29,9 +29,10 @@ LOST = 0.03
 """Chance that a vehicle that vanishes does not come back at all: it may never have been one."""
 AROUND = 1.5
 """Lengths about a new track in which a hidden vehicle that is not seen may be that one."""
-SCALES = (0.6, 2.0)
-"""Bounds of what rehearsals make of the usual covariance: it is below bridges and at their ends that drivers
-brake, and there nobody can be rehearsed; and what is no vehicle is rehearsed, too."""
+SCALES = ((0.6, 0.1), (2.0, 2.0))
+"""Least and most that rehearsals make of the usual variances along the way and across it: it is below bridges
+and at their ends that drivers brake, and there nobody can be rehearsed; and what is no vehicle is rehearsed,
+too."""
 RIM = 10.0
 """Px at the picture's border where nothing is sure to be seen."""
 INSIDE, ENTERING = 2e-5, 4e-5
@@ -56,9 +57,9 @@ class HiddenVehicles:
         self._calibration = Calibration(forecaster)
         self._size = np.array([width, height], float)
         self._longest = round(LONGEST * rate)
-        self._tick = 0
         self._unlikely: dict[int, int] = {}
         self._beliefs: dict[int, Belief] = {}
+        self._covariances: dict[int, Floats] = {}
 
     def rehearse(self, trajectories: Trajectories, tick: int, seen: list[int]) -> None:
         """Let the calibration learn from what is seen."""
@@ -79,11 +80,12 @@ class HiddenVehicles:
             begun: Tracks of which it is not yet decided who they are.
         """
         left = []
-        self._tick = tick
         for track in self.tracks:
             assert track.forecast is not None
             track.forecast.step(tick)
             turn_to_velocity(track)
+            lead = tick - track.since
+            self._covariances[track.id] = self._calibration.covariance(track.forecast, lead, SCALES)
         for track, visible in zip(self.tracks, self._visible(inverse(to_mosaic), begun), strict=True):
             belief = self._beliefs[track.id]
             belief.miss(visible)
@@ -95,11 +97,8 @@ class HiddenVehicles:
         self.tracks = left
 
     def covariance(self, track: Track) -> Floats:
-        """Return (2, 2) of a forecast, calibrated, px^2."""
-        assert track.forecast is not None
-        least, most = SCALES
-        scale = min(max(self._calibration.scale(self._tick - track.since), least), most)
-        return np.asarray(scale * track.forecast.covariance)
+        """Return (2, 2) of a forecast, calibrated, px^2, as of the last `step`."""
+        return self._covariances[track.id]
 
     def _visible(self, to_picture: Floats, begun: Sequence[Track]) -> Floats:
         """Return (N, K) the chance that each hidden vehicle is in plain view at the offsets of its belief."""
@@ -118,7 +117,7 @@ class HiddenVehicles:
         return np.asarray(framed * visible.reshape(framed.shape))
 
     def _forget(self, number: int) -> None:
-        del self._unlikely[number], self._beliefs[number]
+        del self._unlikely[number], self._beliefs[number], self._covariances[number]
 
     def reacquire(self, new: list[Track], to_mosaic: Floats) -> list[tuple[Track, Track]]:
         """Return pairs of a hidden track and the new one that is the same vehicle; the hidden are let go."""

@@ -73,7 +73,7 @@ class Fusion:
     motion: bool = True
     looks: float = 8.0
     most: float = 4.0
-    gate: float = 16.0
+    gate: float = 36.0
     least: float = 0.0
 
     def __call__(self, hidden: Hidden, new: Appeared) -> tuple[Indices, Indices]:

@@ -60,6 +60,7 @@ class CastShadows:
 
         What is no darkened road is a vehicle's; so is what is foreground all along the offset from there. Of
         what is too large for one vehicle the lit parts are left, if they are much of it: shadows joined them.
+        What stands in the shade of a bridge or a building casts none.
 
         Args:
             background: With the last picture laid on it.
@@ -68,6 +69,7 @@ class CastShadows:
         self._frame += 1
         bounds = background.low, background.high
         lit, own = self._shadows.remove(background.laid, background.ground, mask, bounds)
+        lit = lit | (mask & background.shade)
         lit, own = (_as_mask(cv2.morphologyEx(m.view(np.uint8), cv2.MORPH_OPEN, GRAIN)) for m in (lit, own))
         whole, dark = filled(mask), mask & ~lit
         usual = float(np.median(self._areas or [np.inf]))

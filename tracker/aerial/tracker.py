@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tracker.aerial import appearance, tracks
 from tracker.aerial.background import Background
 from tracker.aerial.daylight import Daylight
-from tracker.aerial.forecasts import WINDOW, Forecaster, leads_to
+from tracker.aerial.forecasts import WINDOW, Forecaster, leads_to, went_until
 from tracker.aerial.ghosts import contrast
 from tracker.aerial.hidden import HiddenVehicles
 from tracker.aerial.measuring import corners, free_outlines, outline
@@ -76,8 +76,8 @@ class AerialTracker:
     def start(self, info: Info) -> None:
         """Forget everything and get ready for an episode."""
         self._info = info
-        self._stabiliser, self._background = Stabiliser(), Background()
-        self._shadows, self._daylight = CastShadows(), Daylight()
+        self._stabiliser, self._daylight = Stabiliser(), Daylight()
+        self._background, self._shadows = Background(self._daylight), CastShadows()
         self._trajectories = Trajectories()
         self._tracks: list[Track] = []
         self._hidden = HiddenVehicles(self._forecaster, self._matcher, info.width, info.height, info.rate)
@@ -134,8 +134,10 @@ class AerialTracker:
                     bool(cut[k]),
                     self._usual * LARGEST,
                 )
-        # Two tracks were on one vehicle.
-        self._tracks = [track for track, gone in zip(self._tracks, beaten, strict=True) if not gone]
+        # Two tracks were on one vehicle; two that are known may have gone under a bridge side by side.
+        self._tracks = [
+            track for track, gone in zip(self._tracks, beaten, strict=True) if not gone or self._known(track)
+        ]
         missed = [track for track in self._tracks if track.misses]
         free.centres[:] += origin
         cut = self._cut_off(transform(to_picture, free.corners()))
@@ -209,14 +211,15 @@ class AerialTracker:
     def _hide(self) -> None:
         """End what was not found again; of what was a vehicle for sure a forecast is begun."""
         for track in self._tracks:
-            if (
-                track.misses >= tracks.MOST_MISSES
-                and track.confirmed
-                and track.hits >= LEAST_HISTORY
-                and track.path in self._trajectories
-            ):
+            if track.misses >= tracks.MOST_MISSES and self._known(track):
+                track.since = went_until(self._trajectories, track.path, float(track.size[0]))
+                self._trajectories.cut(track.path, track.since)
                 self._hidden.add(track, self._trajectories)
         self._tracks = [track for track in self._tracks if track.misses < tracks.MOST_MISSES]
+
+    def _known(self, track: Track) -> bool:
+        """Tell whether a track is a vehicle for sure, and can be forecast."""
+        return track.confirmed and track.hits >= LEAST_HISTORY and track.path in self._trajectories
 
     def _decide(self, to_mosaic: Floats) -> None:
         """Confirm new tracks, and give those that are hidden vehicles their ids back."""

@@ -65,7 +65,7 @@ class Track:
         whole: Whether it was in full view when last measured.
         pictures: What it looked like, (D,) each.
         forecast: Of a track that is not seen.
-        since: Last tick at which it was seen.
+        since: Last tick at which it was seen, or, of a track that is not seen, of its path.
     """
 
     id: int

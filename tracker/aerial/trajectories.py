@@ -87,6 +87,11 @@ class Trajectories:
         for tick, point in enumerate(np.asarray(points, float), begin):
             self.append(track, tick, point)
 
+    def cut(self, track: int, last: int) -> None:
+        """Forget a track's points after a tick that it has one of."""
+        row = self._rows[track]
+        self._counts[row] = last + 1 - int(self._begins[row])
+
     def remove(self, track: int) -> None:
         """Forget a track, if it is known; the last row takes its place."""
         if track not in self._rows:

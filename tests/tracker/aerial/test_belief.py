@@ -20,10 +20,17 @@ def test_deviations_are_those_of_the_ellipse():
 def test_the_density_is_one():
     belief = Belief()
     belief.miss((OFFSETS > 0.5).astype(float))
-    along, across = np.meshgrid(np.arange(-70, 70, 0.5), np.arange(-16, 16, 0.5))
+    along, across = np.meshgrid(np.arange(-70, 70, 0.5), np.arange(-40, 40, 0.5))
     points = CENTRE + along.reshape(-1, 1) * HEADING + across.reshape(-1, 1) * BESIDE
     density = np.exp(belief.log_density(points, CENTRE, HEADING, COVARIANCE))
     assert density.sum() * 0.25 == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_change_of_lanes_is_less_likely_but_not_impossible():
+    lanes = CENTRE + np.array([[0.0], [3.0], [18.0]]) * BESIDE
+    own, near, other = Belief().log_density(lanes, CENTRE, HEADING, COVARIANCE)
+    assert own - near == pytest.approx(2.5 * np.log(1.25))
+    assert own - other == pytest.approx(2.5 * np.log(10.0))
 
 
 def test_a_vehicle_is_not_where_it_would_have_been_seen():

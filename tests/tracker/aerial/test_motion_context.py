@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tracker.aerial import lyapunov
 from tracker.aerial.calibration import Calibration, quantile, scale
-from tracker.aerial.forecasts import Growth, KalmanForecast, LinearForecast, leads_to
+from tracker.aerial.forecasts import Growth, KalmanForecast, LinearForecast, leads_to, went_until
 from tracker.aerial.motion_context import PRINTED, ContextForecast, ContextParameters
 from tracker.aerial.regression import affine, carry, similarity
 from tracker.aerial.trajectories import Trajectories
@@ -261,6 +261,29 @@ def test_a_place_straight_ahead():
     assert not leads_to(known, 1, np.array([0.0, 0.0]))
 
 
+@pytest.mark.parametrize(
+    ("going", "speed", "standing", "creeping", "until"),
+    [
+        (60, 1.5, 40, 0.05, 53),  # Ten px before the end: eight of them at its speed.
+        (60, 1.5, 0, 0.0, 59),
+        (60, 1.5, 40, 0.75, 99),  # It braked.
+        (60, 0.05, 40, 0.05, 99),  # It always crept.
+        (20, 1.5, 40, 0.05, 59),  # Too short to tell its speed.
+    ],
+)
+def test_who_stands_at_the_end_of_its_path_had_gone_before(going, speed, standing, creeping, until):
+    known = Trajectories()
+    steps = np.append(np.full(going, speed), np.full(standing, creeping))
+    for tick, way in enumerate(np.cumsum(steps)):
+        known.append(1, tick, np.array([100.0 + way, 50.0]))
+    assert went_until(known, 1, 20.0) == until
+    known.cut(1, until)
+    assert known.extent(1) == (0, until)
+    np.testing.assert_allclose(known.at(1, [until])[0], [100.0 + steps[: until + 1].sum(), 50.0])
+    known.append(1, until + 2, np.array([500.0, 50.0]))
+    assert known.extent(1) == (0, until + 2)
+
+
 def test_without_predictors_it_goes_straight_on():
     known = Trajectories()
     for tick in range(40):
@@ -335,22 +358,32 @@ def test_growth_is_wider_along_the_way():
     assert along @ spread @ across == pytest.approx(0.0, abs=1e-9)
 
 
-@given(st.integers(0, 10_000), st.floats(0.2, 5.0))
+@given(st.integers(0, 10_000), st.floats(0.2, 5.0), st.floats(0.2, 5.0))
 @settings(max_examples=20, deadline=None)
-def test_scale_restores_the_shares(seed, factor):
-    measures = factor * np.random.default_rng(seed).chisquare(2, 4000)
-    assert scale(measures) == pytest.approx(factor, rel=0.15)
+def test_scale_restores_the_shares_of_each_axis(seed, along, across):
+    squares = [along, across] * np.random.default_rng(seed).chisquare(1, (4000, 2))
+    assert scale(squares) == pytest.approx([along, across], rel=0.15)
     assert quantile([0.5, 0.95]) == pytest.approx([1.3863, 5.9915], abs=1e-4)
-    assert scale([]) == 1.0
+    assert (scale([]) == 1.0).all()
 
 
 def test_calibration_rehearses_on_what_is_seen():
     rng = np.random.default_rng(4)
     known, calibration = Trajectories(), Calibration(LinearForecast, every=5)
+    way = np.array([0.6, 0.8])
     for tick in range(400):
         for track in (1, 2, 3):
-            known.append(track, tick, [3.0 * tick + rng.normal(0, 0.3), 40.0 * track + rng.normal(0, 0.3)])
+            place = 3.0 * tick * way + 40.0 * track * np.array([0.8, -0.6])
+            known.append(track, tick, place + rng.normal(0, 0.3, 2) + 4.0 * np.sin(0.02 * tick) * way)
         calibration.step(known, tick, [1, 2, 3] if tick > 40 else [])
-    # Nothing speeds up or brakes here: the usual growth is far too wide.
-    assert calibration.scale(60) < 0.5
-    assert calibration.scale(60) == calibration.scale(200)
+    forecast = LinearForecast(known, 1)
+    forecast.step(459)
+    found, usual = calibration.covariance(forecast, 60), forecast.covariance
+    across = np.array([-way[1], way[0]])
+    # They brake and speed up a little, and keep to their lanes: the usual growth is too wide, most across.
+    assert way @ found @ way < 0.8 * way @ usual @ way
+    assert across @ found @ across == pytest.approx(0.1 * across @ usual @ across, rel=0.7)
+    assert np.array_equal(found, calibration.covariance(forecast, 200))
+    bounded = calibration.covariance(forecast, 60, [[1.0, 0.5], [2.0, 2.0]])
+    assert way @ bounded @ way == pytest.approx(way @ usual @ way, rel=0.02)
+    assert across @ bounded @ across == pytest.approx(0.5 * across @ usual @ across, rel=0.02)

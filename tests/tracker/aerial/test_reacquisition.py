@@ -190,3 +190,16 @@ def test_occluders_are_learnt_and_forgotten():
         known.see(bridge, east)
     assert known.visible(bridge, east)[0] > 0.8
     assert known.visible(np.zeros((0, 2)), east).shape == (0,)
+
+
+def test_a_change_of_lanes_is_left_to_the_density():
+    pictures = np.random.default_rng(2).uniform(0, 255, (1, 216))
+    hidden = Hidden(
+        centres=np.zeros((1, 2)),
+        covariances=np.diag([100.0, 4.0])[None],
+        pictures=[pictures],
+        densities=np.array([[-4.0]]),
+    )
+    new = Appeared(centres=np.array([[0.0, 10.0]]), pictures=pictures, strangers=np.array([2e-5]))
+    assert len(Fusion()(hidden, new)[0]) == 1
+    assert len(Fusion(gate=16.0)(hidden, new)[0]) == 0

@@ -8,10 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tracker.aerial.appearance import PATCH
 from tracker.aerial.background import Background
+from tracker.aerial.daylight import Daylight
 from tracker.aerial.shadows import EVERY, CastShadows, filled, goes_on
 
 NONE = np.zeros((0, 4))
+PIXELS = 3 * PATCH[0] * PATCH[1]
 
 
 ROAD = np.array([110, 112, 114], np.uint8)
@@ -58,10 +61,16 @@ def test_a_vehicle_of_the_roads_colour_is_filled_and_two_that_touch_are_not():
     assert not whole[25:35, 62:75].any()
 
 
-def _drive(frames, draw):
-    """Let shadows be learnt from vehicles that are drawn on a plain road; return them and what is left."""
+def _drive(frames, draw, shaded=slice(0, 0)):
+    """Let shadows be learnt from vehicles that are drawn on a plain road; return them and what is left.
+
+    The rows ``shaded`` are in the shade.
+    """
     ground = np.tile(ROAD, (120, 160, 1))
-    background, shadows = Background(), CastShadows()
+    ground[shaded] = SHADE
+    daylight = Daylight()
+    daylight.restore(np.zeros(PIXELS), np.tile(ROAD, PIXELS // 3))
+    background, shadows = Background(daylight), CastShadows()
     for _ in range(12):
         background.apply(ground, np.eye(3), NONE)
     for k in range(frames):
@@ -97,6 +106,16 @@ def test_a_dark_vehicle_gets_the_usual_shadow_taken_off_and_a_tall_bright_one_it
     for top in (20, 60, 90):
         rows = np.flatnonzero(left[top - 5 : top + 25].any(1)) + top - 5
         assert (rows[0], rows[-1]) == pytest.approx((top, top + 9), abs=1)
+
+
+@pytest.mark.parametrize("shaded", [True, False])
+def test_nothing_is_taken_off_who_drives_in_the_shade(shaded):
+    def draw(seen, x):
+        _with_shadow(seen, x, 20, (235, 230, 228))
+        seen[90:100, 130 - x : 154 - x] = 0.55 * seen[90:100, 130 - x : 154 - x]
+
+    _, left = _drive(20 * EVERY, draw, slice(60, 120 if shaded else 60))
+    assert left[85:105].sum() == 10 * 24 if shaded else left[85:105].sum() < 0.7 * 10 * 24
 
 
 def test_vehicles_that_a_shadow_joins_fall_apart():

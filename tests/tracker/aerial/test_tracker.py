@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
 from tracker.aerial import tracks
+from tracker.aerial.measuring import outline
 from tracker.aerial.reacquisition import Fusion
 from tracker.aerial.tracker import AerialTracker
 from tracker.base import check_tracker
@@ -130,6 +133,93 @@ def test_a_vehicle_looks_in_the_shade_as_in_the_sun(frames):
                     reds[shaded].append(track.pictures[-1].max())
     assert min(map(len, reds.values())) > 5
     assert abs(np.median(reds[True]) - np.median(reds[False])) < 25
+
+
+def test_where_shade_lies_no_shadows_are_taken_off(frames, monkeypatch):
+    shades = []
+
+    def spy(self, background, mask):
+        shades.append(background.shade)
+        return mask
+
+    monkeypatch.setattr("tracker.aerial.shadows.CastShadows.take_off", spy)
+    tracker = AerialTracker()
+    tracker.start(INFO)
+    for k, image in enumerate(frames[:40]):
+        # The shade lies still on the ground.
+        edge = 250 - round(20 + 8 * np.sin(0.03 * k))
+        image = image.copy()
+        image[:, edge:] = image[:, edge:] * 0.5
+        tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+    inside = shades[-1][20:200]
+    assert inside[:, 245:300].mean() > 0.8
+    assert inside[:, 20:110].mean() < 0.05
+
+
+def test_hidden_vehicles_are_expected_in_their_lanes(frames):
+    tracker, found = AerialTracker(), []
+    tracker.start(INFO)
+    for k, image in enumerate(frames[:120]):
+        tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+        for track in tracker._hidden.tracks if k > 100 else []:
+            axes = np.array([track.heading, [-track.heading[1], track.heading[0]]])
+            usual, own = track.forecast.covariance, tracker._hidden.covariance(track)
+            found.append(np.diag(axes @ own @ axes.T) / np.diag(axes @ usual @ axes.T))
+    along, across = np.array(found).T
+    assert (along > 0.59).all()
+    assert across.min() < 0.45
+
+
+@pytest.mark.parametrize("settled", [True, False])
+def test_a_known_vehicle_that_loses_its_outline_to_another_one_is_hidden(frames, monkeypatch, settled):
+    def beaten(*arguments):
+        own, _, left = outline(*arguments)
+        lost = np.ones(len(own.pixels), bool)
+        return replace(own, pixels=np.zeros_like(own.pixels)), lost, np.zeros_like(left)
+
+    tracker = AerialTracker()
+    tracker.start(INFO)
+    last = 55 if settled else 20
+    for k, image in enumerate(frames[: last + 1]):
+        tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+    before = {track.id for track in tracker._tracks}
+    monkeypatch.setattr("tracker.aerial.tracker.outline", beaten)
+    for k in (last + 1, last + 2):
+        tracker.step(Frame(image=frames[k], tick=k, time=k / 30.0))
+        where = tracker._tracks if k == last + 1 else tracker._hidden.tracks
+        assert bool(before & {track.id for track in where}) == settled
+
+
+def test_the_forecast_of_who_seemed_to_stand_begins_before(frames, monkeypatch):
+    tracker = AerialTracker()
+    tracker.start(INFO)
+    for k, image in enumerate(frames[:60]):
+        tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+    places = {track.id: track.centre for track in tracker._tracks}
+    seen = True
+
+    def stuck(labels, single, senior, centres, *arguments):
+        own, beaten, left = outline(labels, single, senior, centres, *arguments)
+        origin = tracker._background.origin + np.array(tracker._background.view[:2])
+        where = (
+            np.array([places.get(track.id, track.centre) for track in tracker._tracks]).reshape(-1, 2)
+            - origin
+        )
+        sizes = np.array([track.size for track in tracker._tracks]).reshape(-1, 2)
+        pixels = np.full(len(where), 100 if seen else 0)
+        return replace(own, centres=where, sizes=sizes, pixels=pixels), beaten & False, np.zeros_like(left)
+
+    monkeypatch.setattr("tracker.aerial.tracker.outline", stuck)
+    for k, image in enumerate(frames[60:94], 60):
+        seen = k < 90
+        tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+    hidden = [track for track in tracker._hidden.tracks if track.id in places]
+    assert hidden
+    for track in hidden:
+        assert track.since < 65
+        assert track.forecast is not None
+        assert track.forecast.velocity[0] > 1.2
+        assert track.centre[0] > places[track.id][0] + 35.0
 
 
 def test_without_re_acquisition_they_are_new(frames):

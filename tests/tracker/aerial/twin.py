@@ -6,7 +6,16 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
-from tracker.aerial.background import DEVIATIONS, KNOWN, LATE, LEAST_CHANGE, NEW_SPREAD, RATE, SOON
+from tracker.aerial.background import (
+    DEVIATIONS,
+    KNOWN,
+    LATE,
+    LEAST_CHANGE,
+    LEAST_IN_SHADE,
+    NEW_SPREAD,
+    RATE,
+    SOON,
+)
 from tracker.aerial.measuring import REACH, SCRAP
 
 
@@ -61,14 +70,14 @@ class Pixel:
         self.mean, self.spread, self.support = np.zeros(3, np.float32), np.float32(NEW_SPREAD), 0
         self.rival, self.rivals = np.zeros(3), 0
 
-    def see(self, colour, protected, low, high):
+    def see(self, colour, protected, low, high, shade):
         """Take in a colour (3,), given bounds of the neighbours' means; return whether it is foreground."""
         colour = np.asarray(colour, np.float32)
         if not self.support:
             self.mean, self.support = colour.copy(), 1
             return False
         apart = np.maximum(np.maximum(colour - high, low - colour), 0).max()
-        change = LEAST_CHANGE + DEVIATIONS * self.spread
+        change = (LEAST_IN_SHADE if shade else LEAST_CHANGE) + DEVIATIONS * self.spread
         if apart <= change:
             self.support, self.rivals = min(self.support + 1, LATE), max(self.rivals - 1, 0)
             self.mean = self.mean + np.float32(max(1 / self.support, RATE)) * (colour - self.mean)
