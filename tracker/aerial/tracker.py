@@ -97,9 +97,10 @@ class AerialTracker:
         image = np.ascontiguousarray(frame.image)
         to_mosaic = self._stabiliser.step(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
         tracks.predict(self._tracks)
+        before = self._tracks
         seen = self._look(image, to_mosaic)
         self._remember(image, to_mosaic)
-        self._hide()
+        self._hide(before)
         self._hidden.step(self._tick, to_mosaic, [track for track in self._tracks if not track.confirmed])
         self._decide(to_mosaic)
         return self._shown(to_mosaic, seen)
@@ -208,14 +209,22 @@ class AerialTracker:
         way = np.diff(self._trajectories.at(path, [last - WINDOW, last]), axis=0)[0]
         return float(np.hypot(*way)) > GOES
 
-    def _hide(self) -> None:
-        """End what was not found again; of what was a vehicle for sure a forecast is begun."""
-        for track in self._tracks:
-            if track.misses >= tracks.MOST_MISSES and self._known(track):
+    def _hide(self, before: list[Track]) -> None:
+        """End what was not found again; of what was a vehicle for sure a forecast is begun.
+
+        Args:
+            before: The tracks of the last frame.
+        """
+        lost = [track for track in self._tracks if track.misses >= tracks.MOST_MISSES]
+        self._tracks = [track for track in self._tracks if track.misses < tracks.MOST_MISSES]
+        going = {track.id for track in self._tracks}
+        for track in before:
+            if track.id not in going and track.path in self._trajectories:
                 track.since = went_until(self._trajectories, track.path, float(track.size[0]))
                 self._trajectories.cut(track.path, track.since)
+        for track in lost:
+            if self._known(track):
                 self._hidden.add(track, self._trajectories)
-        self._tracks = [track for track in self._tracks if track.misses < tracks.MOST_MISSES]
 
     def _known(self, track: Track) -> bool:
         """Tell whether a track is a vehicle for sure, and can be forecast."""

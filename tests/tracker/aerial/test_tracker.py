@@ -190,12 +190,14 @@ def test_a_known_vehicle_that_loses_its_outline_to_another_one_is_hidden(frames,
         assert bool(before & {track.id for track in where}) == settled
 
 
-def test_the_forecast_of_who_seemed_to_stand_begins_before(frames, monkeypatch):
+@pytest.mark.parametrize("double", [False, True])
+def test_the_path_of_who_seemed_to_stand_ends_before(frames, monkeypatch, double):
     tracker = AerialTracker()
     tracker.start(INFO)
     for k, image in enumerate(frames[:60]):
         tracker.step(Frame(image=image, tick=k, time=k / 30.0))
     places = {track.id: track.centre for track in tracker._tracks}
+    paths = [track.path for track in tracker._tracks if track.confirmed]
     seen = True
 
     def stuck(labels, single, senior, centres, *arguments):
@@ -212,9 +214,13 @@ def test_the_forecast_of_who_seemed_to_stand_begins_before(frames, monkeypatch):
     monkeypatch.setattr("tracker.aerial.tracker.outline", stuck)
     for k, image in enumerate(frames[60:94], 60):
         seen = k < 90
+        if double and not seen:
+            monkeypatch.setattr("tracker.aerial.tracks.doubles", lambda everyone, usual: everyone)
         tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+    assert len(paths) > 1
+    assert all(tracker._trajectories.extent(path)[1] < 65 for path in paths)
     hidden = [track for track in tracker._hidden.tracks if track.id in places]
-    assert hidden
+    assert bool(hidden) != double
     for track in hidden:
         assert track.since < 65
         assert track.forecast is not None
