@@ -215,7 +215,7 @@ def test_the_path_of_who_seemed_to_stand_ends_before(frames, monkeypatch, double
     for k, image in enumerate(frames[60:94], 60):
         seen = k < 90
         if double and not seen:
-            monkeypatch.setattr("tracker.aerial.tracks.doubles", lambda everyone, usual: everyone)
+            monkeypatch.setattr("tracker.aerial.tracks.doubles", lambda everyone, _: everyone)
         tracker.step(Frame(image=image, tick=k, time=k / 30.0))
     assert len(paths) > 1
     assert all(tracker._trajectories.extent(path)[1] < 65 for path in paths)
