@@ -31,13 +31,6 @@ def test_same_seed_same_pixels_other_seed_others():
     assert not np.array_equal(first[0].ids, other[0].ids)
 
 
-def test_the_odometer_is_read_once_a_tick():
-    params = InCarParams()
-    scene = InCarScene(params, seed=0, rate=RATE, seconds=1.0)
-    read = [scene.odometer(scene.step()) for _ in range(3)]
-    assert [seen.odometer for seen in observe(params, 0, 3)] == read
-
-
 @pytest.mark.parametrize("curved", [False, True])
 def test_image_motion_agrees_with_the_depth_map(curved):
     """A static pixel, carried by its depth into the next frame, moves as paper 1's eq. (8) with yaw says."""
