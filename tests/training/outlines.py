@@ -1,4 +1,4 @@
-"""Learns the trees of `tracker.in_car.outline_odds` from simulated drives.
+"""Learns the trees that weigh outlines (`tracker.in_car.cues`) from simulated drives.
 
 ``python -m tests.training.outlines`` drives every in-car scenario over seeds that no validation uses, lets
 the tracker look, compares the outlines that it weighs with the truth, and writes the trees. It begins
@@ -15,9 +15,8 @@ from concurrent.futures import ProcessPoolExecutor
 from itertools import repeat
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import lightgbm
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,9 +30,10 @@ from scenarios.spec import Scenario
 from sim.simulation import Simulation
 from sim.truth.types import FrameTruth
 from sim.world import Role
+from tests.training.boosting import fit, write
+from tracker.boosting import Trees
 from tracker.boxes import iou
 from tracker.in_car.cues import Cue
-from tracker.in_car.outline_odds import Trees
 from tracker.in_car.tracker import InCarTracker
 from tracker.in_car.vehicles import Sighting
 from tracker.types import Frame, Info
@@ -53,8 +53,8 @@ GENERATIONS = 3
 KEPT = 20
 """Outlines of a frame that are learnt from at most: of each, right ones, wrong ones, wrong ones that stand on
 another vehicle (parked, oncoming), and the wrong ones that the last trees found likeliest."""
-TREES, LEAVES, RATE = 200, 32, 0.1
-"""How many trees, of how many leaves, and how much of each step is taken."""
+TREES, LEAVES = 200, 32
+"""How many trees, and of how many leaves."""
 SCORED = ScoringParams(max_distance=100.0, min_height=9.0)
 """Farther ones than are scored, too: they are seen before they are near."""
 RISING = {
@@ -67,6 +67,7 @@ FALLING = {
 }  # fmt: skip
 """Cues of which more never speaks against a vehicle, or never for one: what simulated drives teach beyond
 that does not hold on real ones."""
+MONOTONE = [(cue in RISING) - (cue in FALLING) for cue in Cue]
 
 
 NONE = Trees(
@@ -188,54 +189,6 @@ def _greatest(boxes: Floats, others: Floats) -> Floats:
     return iou(boxes, others).max(0) if len(boxes) else np.zeros(len(others))
 
 
-def fit(cues: Floats, right: NDArray[np.bool_]) -> Trees:
-    """Boost the trees."""
-    count = len(right)
-    booster = lightgbm.train(
-        {
-            "objective": "binary",
-            "num_leaves": LEAVES,
-            "learning_rate": RATE,
-            "min_data_in_leaf": 100,
-            "lambda_l2": 5.0,
-            "monotone_constraints": [(cue in RISING) - (cue in FALLING) for cue in Cue],
-            "max_bin": 63,
-            "num_threads": 1,
-            "deterministic": True,
-            "force_row_wise": True,
-            "seed": 0,
-            "verbosity": -1,
-        },
-        lightgbm.Dataset(cues.astype(np.float32), right.astype(int)),
-        num_boost_round=TREES,
-    )
-    print(f"{count} outlines, {right.mean():.2f} of them vehicles; fitted.")
-    roots: list[int] = []
-    nodes: list[list[float]] = []
-    for tree in booster.dump_model()["tree_info"]:
-        roots.append(len(nodes))
-        _lay_out(tree["tree_structure"], nodes)
-    cue, limit, child = zip(*nodes, strict=True)
-    return Trees(
-        roots=np.array(roots, np.int32),
-        cues=np.array(cue, np.int16),
-        limits=np.array(limit, np.float32),
-        rights=np.array(child, np.int32),
-    )
-
-
-def _lay_out(node: dict[str, Any], nodes: list[list[float]]) -> None:
-    """Append a tree's nodes, parents first, left before right."""
-    if "leaf_value" in node:
-        nodes.append([-1, node["leaf_value"], 0])
-        return
-    here = len(nodes)
-    nodes.append([node["split_feature"], node["threshold"], 0])
-    _lay_out(node["left_child"], nodes)
-    nodes[here][2] = len(nodes)
-    _lay_out(node["right_child"], nodes)
-
-
 def main() -> None:
     """Drive, fit, write."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -256,10 +209,9 @@ def main() -> None:
             kept.append(path)
         for _ in range(GENERATIONS):
             found += pool.map(samples, kept, seeds, repeat(trees))
-            trees = fit(np.concatenate([f[0] for f in found]), np.concatenate([f[1] for f in found]))
-    with moved_in(WRITTEN) as path, path.open("wb") as file:
-        np.savez_compressed(file, **trees._asdict())
-    print(f"Written: {WRITTEN}")
+            cues, right = (np.concatenate(parts) for parts in zip(*found, strict=True))
+            trees = fit(cues, right, trees=TREES, leaves=LEAVES, monotone=MONOTONE)
+    write(trees, WRITTEN)
 
 
 if __name__ == "__main__":

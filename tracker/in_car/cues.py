@@ -1,7 +1,7 @@
 """What speaks for an outline being a vehicle's that goes the ego's way: one number a cue.
 
 Edges and brightness say whether it looks like a vehicle from behind, the points in and around it whether it
-moves like one. `tracker.in_car.outline_odds` weighs them.
+moves like one. Trees (outline_odds.npz, `docs/outlines.md`) weigh them.
 """
 
 from __future__ import annotations

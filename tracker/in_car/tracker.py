@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.boosting import Trees, learnt
 from tracker.in_car.evidence import motion_evidence
 from tracker.in_car.features import stiffness, working_picture
 from tracker.in_car.front_end import FrontEnd
-from tracker.in_car.outline_odds import Trees, learnt_trees
 from tracker.in_car.points import PointStore
 from tracker.in_car.traces import TraceSet
 from tracker.in_car.vehicles import CORRELATION, Sighting, VehicleStore
@@ -52,7 +52,7 @@ class InCarTracker:
         Args:
             trees: By which outlines are weighed; those that come with the tracker if None.
         """
-        self._trees = trees if trees is not None else learnt_trees()
+        self._trees = trees if trees is not None else learnt("tracker.in_car", "outline_odds")
         self._diagnostics = Diagnostics()
 
     def start(self, info: Info) -> None:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.boosting import Trees, log_odds
 from tracker.in_car.body import body_motion, covered, inward
 from tracker.in_car.cues import Cue, cues
 from tracker.in_car.features import Picture
 from tracker.in_car.lamps import on_lamp
-from tracker.in_car.outline_odds import Trees, log_odds
 from tracker.in_car.outlines import outlines
 from tracker.in_car.points import PointStore
 from tracker.in_car.relief import Relief, make_relief

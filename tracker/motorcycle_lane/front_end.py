@@ -30,15 +30,15 @@ class Sight:
     blobs: Blobs
 
 
-def look(image: NDArray[np.uint8], raw: NDArray[np.bool_], shadow: NDArray[np.bool_] | None = None) -> Sight:
+def look(image: NDArray[np.uint8], raw: NDArray[np.bool_], chosen: NDArray[np.bool_] | None = None) -> Sight:
     """Clean the foreground of a picture and find its regions.
 
     Args:
         image: (H, W, 3) RGB.
         raw: (H, W) raw foreground.
-        shadow: (H, W) what of it is taken for shadow, if that was looked for.
+        chosen: (H, W) what is a vehicle in or near it, if that was looked for.
     """
-    shadow = np.zeros_like(raw) if shadow is None else shadow
-    mask = clean(raw & ~shadow)
+    mask = clean(raw if chosen is None else chosen)
     blobs = find_blobs(mask, max(15, round(LEAST_AREA * mask.size)))
-    return Sight(image=image, mask=mask, doubtful=shadow & ~mask, blobs=blobs)
+    doubtful = np.zeros_like(mask) if chosen is None else raw & ~mask
+    return Sight(image=image, mask=mask, doubtful=doubtful, blobs=blobs)

@@ -1,8 +1,8 @@
 """The motorcycle-lane tracker: paper 3's idea with its limits mended (registry name ``motorcycle-lane``).
 
-A statistical background model gives the foreground; its regions give a measurement of each rider, also where
-riders touch or hide one another; joint probabilistic data association follows them, each with a probability
-that it exists.
+A statistical background model gives the foreground; learnt trees tell what of it are riders and what their
+shadows; its regions give a measurement of each rider, also where riders touch or hide one another; joint
+probabilistic data association follows them, each with a probability that it exists.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.blobs import clean
+from tracker.boosting import learnt
 from tracker.motorcycle_lane.background import BackgroundModel
 from tracker.motorcycle_lane.episode import EpisodeTracker
 from tracker.motorcycle_lane.flow import Flow
+from tracker.motorcycle_lane.foreground import vehicles
 from tracker.motorcycle_lane.front_end import Sight, look
-from tracker.motorcycle_lane.measuring import Expected, Measurer
-from tracker.motorcycle_lane.shade import STANDING, expectation, raise_upright, shadow_of
+from tracker.motorcycle_lane.measuring import Measurer
 from tracker.motorcycle_lane.tracks import TrackStore
 from tracker.types import Association, Diagnostics, Frame, Predictions, Status, Tracks
 
@@ -29,6 +29,7 @@ class MotorcycleLaneTracker(EpisodeTracker):
 
     def _begin(self) -> None:
         self._background = BackgroundModel(self._info.width, self._info.height)
+        self._trees = learnt("tracker.motorcycle_lane", "foreground")
         self._measurer = Measurer(self._info.width, self._info.height)
         self._store = TrackStore(self._info.width, self._info.height, self._info.rate)
         self._flow = Flow(self._info.width, self._info.height, self._info.rate)
@@ -52,7 +53,7 @@ class MotorcycleLaneTracker(EpisodeTracker):
             ids=tracks.ids, centres=tracks.centres.copy(), covariances=tracks.covariance[:, ::2, ::2].copy()
         )
         at, expected = store.expected()
-        sight = self._look(frame.image, expected)
+        sight = self._look(frame.image)
         seen = self._measurer.measure(sight, expected)
         joined = np.zeros(len(tracks), np.bool_)
         joined[at] = seen.joined
@@ -86,14 +87,11 @@ class MotorcycleLaneTracker(EpisodeTracker):
             covariance=tracks.covariance[:, SHOWN[:, None], SHOWN],
         )
 
-    def _look(self, image: NDArray[np.uint8], expected: Expected) -> Sight:
+    def _look(self, image: NDArray[np.uint8]) -> Sight:
         """Return what is neither background nor a shadow on it."""
         raw = self._background.apply(image)
-        odds = expectation(STANDING, expected.boxes[expected.moved], *raw.shape)
-        if self._measurer.sizes.learnt:
-            (_, high), (_, grows) = self._measurer.sizes.line
-            raise_upright(odds, clean(raw), high, grows)
-        return look(image, raw, shadow_of(image, self._background.background, raw, odds))
+        heights = self._measurer.sizes.sizes(np.arange(len(raw), dtype=float))[:, 1]
+        return look(image, raw, vehicles(image, self._background.background, raw, heights, self._trees))
 
     def _clip(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
         limits = np.array([self._info.width, self._info.height] * 2, float)

@@ -12,15 +12,16 @@ from scenarios.loop import run_episode
 from scenarios.score.summary import score
 from tests.tracker.in_car.reliefs import drawn_cars, relief_of
 from tracker import registry
+from tracker.boosting import learnt
 from tracker.in_car.body import covered
 from tracker.in_car.features import Picture
-from tracker.in_car.outline_odds import learnt_trees
 from tracker.in_car.points import PointStore
 from tracker.in_car.vehicles import HIGHEST, INWARD, LONG, SEARCH, WALK, Vehicle, VehicleStore
 from tracker.in_car.yaw import EgoMotion
 
 RATE = 30.0
 HORIZON = 110.0
+TREES = learnt("tracker.in_car", "outline_odds")
 WIDTH, FOCUS = 320, np.array([160.0, HORIZON])
 
 
@@ -60,7 +61,7 @@ def test_a_box_moves_and_grows_with_its_points():
     box = np.array([120.0, 105, 165, 140])
     rng = np.random.default_rng(0)
     points = points_at(rng.uniform(box[:2], box[2:], (20, 2)), owner=1)
-    store, vehicle = VehicleStore(rate=RATE, trees=learnt_trees()), vehicle_at(box)
+    store, vehicle = VehicleStore(rate=RATE, trees=TREES), vehicle_at(box)
     shift, growth = np.array([0.8, 0.3]), 0.004
     for _ in range(90):
         middle = points.position.mean(0)
@@ -80,7 +81,7 @@ def test_a_point_that_does_not_move_along_is_let_go():
     box = (120, 105, 165, 140)
     points = points_at(np.random.default_rng(1).uniform(box[:2], box[2:], (9, 2)), owner=1)
     points.flow[4] = (5.0, 0.0)
-    store, vehicle = VehicleStore(rate=RATE, trees=learnt_trees()), vehicle_at(box)
+    store, vehicle = VehicleStore(rate=RATE, trees=TREES), vehicle_at(box)
     store._carry(vehicle, points, points.flow, WIDTH, FOCUS)
     assert points.owner.tolist() == [1] * 4 + [0] + [1] * 4
     assert vehicle.box == pytest.approx(box)
@@ -88,7 +89,7 @@ def test_a_point_that_does_not_move_along_is_let_go():
 
 def test_without_points_a_vehicle_goes_on_and_is_missed():
     store, vehicle = (
-        VehicleStore(rate=RATE, trees=learnt_trees()),
+        VehicleStore(rate=RATE, trees=TREES),
         vehicle_at((120, 105, 165, 140), velocity=np.array([2.0, 0])),
     )
     points = points_at(np.empty((0, 2)), owner=0)
@@ -105,7 +106,7 @@ def test_what_comes_into_the_picture_goes_on_beyond_its_edge(before, after):
     toward = 2.0 if before[0] == 0 else -2.0
     points = points_at(np.random.default_rng(4).uniform(before[:2], before[2:], (9, 2)), owner=1)
     points.flow[:] = (toward, 0.0)
-    store, vehicle = VehicleStore(rate=RATE, trees=learnt_trees()), vehicle_at(before)
+    store, vehicle = VehicleStore(rate=RATE, trees=TREES), vehicle_at(before)
     store._carry(vehicle, points, points.flow * RATE * 0.35, WIDTH, FOCUS)
     assert vehicle.box == pytest.approx(after)
     assert vehicle.inward > INWARD
@@ -116,7 +117,7 @@ def test_what_comes_into_the_picture_goes_on_beyond_its_edge(before, after):
 
 @pytest.mark.parametrize(("left", "others", "vehicles"), [(0, 4, 2), (0, 12, 1), (20, 12, 2)])
 def test_points_of_one_vehicle_do_not_begin_another_that_is_cut_off(left, others, vehicles):
-    store = VehicleStore(rate=RATE, trees=learnt_trees())
+    store = VehicleStore(rate=RATE, trees=TREES)
     store.vehicles, store._next_id = [vehicle_at((155, 120, 170, 140))], 2
     free = np.random.default_rng(5).uniform((22, 112), (140, 178), (8, 2))
     held = np.random.default_rng(6).uniform((155, 120), (160, 140), (others, 2))
@@ -141,7 +142,7 @@ def test_points_of_one_vehicle_do_not_begin_another_that_is_cut_off(left, others
     ],
 )
 def test_who_is_given_up(box, settings, stays):
-    store = VehicleStore(rate=RATE, trees=learnt_trees())
+    store = VehicleStore(rate=RATE, trees=TREES)
     store.vehicles = [vehicle_at(box, **settings)]
     points = points_at([(140.0, 120.0)], owner=1)
     assert ended(store, points) == ([1] if stays else [])
@@ -149,7 +150,7 @@ def test_who_is_given_up(box, settings, stays):
 
 
 def test_of_two_boxes_on_one_vehicle_the_surer_stays():
-    store = VehicleStore(rate=RATE, trees=learnt_trees())
+    store = VehicleStore(rate=RATE, trees=TREES)
     store.vehicles = [
         vehicle_at((120, 105, 165, 140), confirmed=True, odds=1.0),
         vehicle_at((122, 106, 160, 140), confirmed=True, odds=4.0),
@@ -159,7 +160,7 @@ def test_of_two_boxes_on_one_vehicle_the_surer_stays():
 
 
 def test_points_join_the_vehicle_they_move_with():
-    store = VehicleStore(rate=RATE, trees=learnt_trees())
+    store = VehicleStore(rate=RATE, trees=TREES)
     store.vehicles = [vehicle_at((120, 105, 165, 140))]
     inside, outside, passing, doubtful = (140.0, 120.0), (180.0, 120.0), (150.0, 120.0), (130.0, 120.0)
     points = points_at([inside, outside, passing, doubtful], owner=0)
@@ -182,7 +183,7 @@ def test_points_join_the_vehicle_they_move_with():
 )
 def test_a_whole_one_that_looks_like_a_vehicle_for_long_is_sure(box, speed, sure):
     grey, _ = drawn_cars([(box[0], box[2], box[3])])
-    relief, store = relief_of(grey, horizon=HORIZON), VehicleStore(rate=RATE, trees=learnt_trees())
+    relief, store = relief_of(grey, horizon=HORIZON), VehicleStore(rate=RATE, trees=TREES)
     vehicle = vehicle_at(box, odds=HIGHEST, age=60)
     for look in range(round(LONG * RATE / SEARCH)):
         assert not vehicle.confirmed, look
@@ -195,7 +196,7 @@ def test_nothing_is_begun_where_no_point_moves_like_a_vehicle():
     points = points_at(np.random.default_rng(2).uniform((122, 108), (163, 138), (30, 2)), owner=0)
     points.evidence[:] = -3.0
     ego = EgoMotion(focal=300.0, focus=(160.0, HORIZON), sure=True, rate=RATE)
-    store = VehicleStore(rate=RATE, trees=learnt_trees())
+    store = VehicleStore(rate=RATE, trees=TREES)
     picture = Picture(grey=grey, red=np.zeros_like(grey), scale=1.0, brightness=float(grey.mean()))
     for _ in range(6):
         store.step(picture, points, np.zeros((30, 2)), ego, 4.0)

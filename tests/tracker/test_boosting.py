@@ -1,22 +1,21 @@
-"""The trees that weigh outlines: well formed, and walked as trees are."""
+"""Boosted trees: those that come with the trackers are well formed, and all are walked as trees are."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracker.in_car.cues import COUNT
-from tracker.in_car.outline_odds import (
-    FIRST,
-    HOPELESS,
-    MOST_LEAVES,
-    Trees,
-    _hash,
-    _sum,
-    learnt_trees,
-    log_odds,
-)
+from tracker.boosting import FIRST, HOPELESS, MOST_LEAVES, Trees, _hash, _sum, learnt, log_odds
+from tracker.in_car.cues import COUNT as OUTLINE_CUES
+from tracker.motorcycle_lane.foreground import COUNT as PIXEL_CUES
+
+COUNT = 20
+LEARNT = [
+    ("tracker.in_car", "outline_odds", OUTLINE_CUES),
+    ("tracker.motorcycle_lane", "foreground", PIXEL_CUES),
+]
 
 
 def leaf(grown, node, row):
@@ -72,12 +71,13 @@ def test_sums_are_those_of_a_walk_through_random_trees(seed, count):
     np.testing.assert_allclose(_sum(found, *grown), [walk(grown, row) for row in found], atol=1e-9)
 
 
-def test_learnt_trees_are_well_formed():
-    grown = learnt_trees()
+@pytest.mark.parametrize(("package", "name", "count"), LEARNT)
+def test_learnt_trees_are_well_formed(package, name, count):
+    grown = learnt(package, name)
     inner = grown.cues >= 0
     assert len(grown.roots) > FIRST
     assert grown.roots[0] == 0
-    assert grown.cues.max() < COUNT
+    assert grown.cues.max() < count
     assert np.isfinite(grown.limits).all()
     assert max(np.add.reduceat(~inner, grown.roots)) <= MOST_LEAVES
     # Every node but the roots is the child of exactly one.
@@ -86,21 +86,37 @@ def test_learnt_trees_are_well_formed():
     assert (grown.rights[inner] > np.flatnonzero(inner) + 1).all()
 
 
-def test_learnt_trees_are_walked_and_given_up():
+@pytest.mark.parametrize(("package", "name", "count"), LEARNT)
+def test_learnt_trees_are_walked_and_given_up(package, name, count):
     rng = np.random.default_rng(3)
-    grown = learnt_trees()
+    grown = learnt(package, name)
     # Near the limits that the trees ask for, so that all branches are taken.
-    spread = [np.concatenate([grown.limits[grown.cues == cue], [0.0]]) for cue in range(COUNT)]
+    spread = [np.concatenate([grown.limits[grown.cues == cue], [0.0]]) for cue in range(count)]
     found = np.stack([rng.choice(limits, 300) for limits in spread], axis=1).astype(float)
-    odds = log_odds(found, learnt_trees())
+    odds = log_odds(found, grown)
     np.testing.assert_allclose(odds, [walk(grown, row) for row in found.astype(np.float32)], atol=1e-9)
-    assert (odds < HOPELESS).any()
-    assert (odds > HOPELESS).any()
+    assert (odds < 0.0).any()
+    assert (odds > 0.0).any()
+
+
+def test_what_the_first_trees_leave_no_hope_is_given_up():
+    stump = Trees(*(np.zeros(0, kind) for kind in (np.int32, np.int16, np.float32, np.int32)))
+    for _ in range(FIRST + 20):
+        one = Trees(
+            np.array([len(stump.cues)], np.int32),
+            np.array([0, -1, -1], np.int16),
+            np.array([0.0, HOPELESS / FIRST - 0.01, HOPELESS / FIRST + 0.01], np.float32),
+            np.array([len(stump.cues) + 2, 0, 0], np.int32),
+        )
+        stump = Trees(*(np.concatenate(parts) for parts in zip(stump, one, strict=True)))
+    odds = log_odds(np.array([[-1.0], [1.0]]), stump)
+    steps = np.array([FIRST, FIRST + 20]) * (HOPELESS / FIRST + np.array([-0.01, 0.01]))
+    np.testing.assert_allclose(odds, steps, rtol=1e-5)
 
 
 def test_every_leaf_has_a_place_of_its_own():
     assert {int(_hash(np.uint32(1 << leaf))) for leaf in range(MOST_LEAVES)} == set(range(MOST_LEAVES))
 
 
-def test_no_outlines_no_odds():
-    assert log_odds(np.empty((0, COUNT)), learnt_trees()).shape == (0,)
+def test_no_candidates_no_odds():
+    assert log_odds(np.empty((0, COUNT)), grow(np.random.default_rng(0), 3)).shape == (0,)

@@ -1,15 +1,13 @@
-"""The log odds that an outline is a vehicle's that goes the ego's way: boosted trees over its cues.
+"""Boosted trees: log odds from cues. They are learnt elsewhere; this reads and adds them up.
 
-The trees (outline_odds.npz) were learnt from simulated drives. They are of an earlier state of
-``python -m tests.training.outlines``, which learnt from the mistakes of still earlier trees; that command now
-begins from nothing and makes others, as good on simulated drives (`docs/outlines.md`).
+The trees of each tracker lie beside it, and the commands that learnt them in ``tests/training``.
 """
 
 from __future__ import annotations
 
 from functools import cache
 from importlib.resources import as_file, files
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -17,10 +15,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# After so many trees an outline with odds below HOPELESS is given up: the others could not save it.
 FIRST, HOPELESS = 40, -4.0
-# A tree's leaves have a bit each in a word.
+"""After so many trees whose odds are below that is given up: the others could not save it."""
 MOST_LEAVES = 32
+"""A tree's leaves have a bit each in a word."""
 
 
 class Trees(NamedTuple):
@@ -40,10 +38,10 @@ class Trees(NamedTuple):
 
 
 @cache
-def learnt_trees() -> Trees:
-    """Read the trees that come with the tracker."""
-    with as_file(files("tracker.in_car") / "outline_odds.npz") as path, np.load(path) as stored:
-        return Trees(**{name: stored[name] for name in Trees._fields})
+def learnt(package: str, name: str) -> Trees:
+    """Read the trees ``name`` (.npz) that come with a package of a tracker."""
+    with as_file(files(package) / f"{name}.npz") as path, np.load(path) as stored:
+        return Trees(**{field: stored[field] for field in Trees._fields})
 
 
 @njit(cache=True)
@@ -54,9 +52,9 @@ def _hash(bit):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _sum(found, roots, cues, limits, rights):  # type: ignore[no-untyped-def]
-    """Add up the trees' leaves for outlines with the cues (K, C).
+    """Add up the trees' leaves for K candidates with the cues (K, C).
 
-    All nodes of a tree are asked of all outlines, which takes no branch and several outlines at a time: a
+    All nodes of a tree are asked of all candidates, which takes no branch and several at a time: a
     node that leads to the right strikes out the leaves on its left, and the first that is left over is the
     one (QuickScorer; Lucchese et al., SIGIR 2015).
     """
@@ -92,7 +90,7 @@ def _sum(found, roots, cues, limits, rights):  # type: ignore[no-untyped-def]
     return result
 
 
-def log_odds(found: Floats, weighed_by: Trees) -> Floats:
-    """Return the log odds (K,) of outlines with the cues (K, C)."""
+def log_odds(found: NDArray[np.floating[Any]], weighed_by: Trees) -> Floats:
+    """Return the log odds (K,) of candidates with the cues (K, C)."""
     result: Floats = _sum(found.astype(np.float32), *weighed_by)
     return result

@@ -1,0 +1,144 @@
+"""What of the foreground is a vehicle: cues as naive code reads them, squares, a rider and its shadow."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from tracker.blobs import clean
+from tracker.boosting import learnt
+from tracker.motorcycle_lane import foreground as fg
+
+SHAPE = 14, 17
+Images = arrays(np.uint8, (*SHAPE, 3))
+Masks = arrays(np.bool_, SHAPE)
+
+
+def smoothed(picture):
+    """Means over 3 x 3 pixels, the picture mirrored at its border."""
+    wide = np.pad(picture.astype(float), ((1, 1), (1, 1), (0, 0)), mode="reflect")
+    height, width = picture.shape[:2]
+    return sum(wide[y : y + height, x : x + width] for y in range(3) for x in range(3)) / 9
+
+
+def window(middle, half, limit):
+    """What of an axis lies so near; beyond the picture its outermost pixel."""
+    inside = [w for w in range(middle - half, middle + half + 1) if 0 <= w < limit]
+    return inside or [0 if middle < 0 else limit - 1]
+
+
+def naive_cues(image, background, raw, heights, y, x):
+    now, then = smoothed(image), smoothed(background)
+    ratios = ((now + 1) / (then + 1)).mean(2)
+    capped = np.minimum(ratios, fg.BRIGHTEST)
+    grey, ground = now.mean(2), then.mean(2)
+    edges = np.zeros(SHAPE)
+    for v in range(1, SHAPE[0] - 1):
+        for u in range(1, SHAPE[1] - 1):
+            steep = [
+                grey[v + dy, u + dx]
+                - grey[v - dy, u - dx]
+                - capped[v, u] * (ground[v + dy, u + dx] - ground[v - dy, u - dx])
+                for dy, dx in ((0, 1), (1, 0))
+            ]
+            edges[v, u] = min(np.hypot(*steep) / (grey[v, u] + fg.DIM), 1)
+    red, green, blue = (now[y, x] + 1) / (then[y, x] + 1)
+    mean = ratios[y, x]
+    most, least = now[y, x].max(), now[y, x].min()
+    found = [mean, (blue - red) / mean, (green - (red + blue) / 2) / mean]
+    found += [(most - least) / (most + fg.DIM), now[y, x].sum()]
+    for dy, dx in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        steps, v, u = 0, y, x
+        while 0 <= v < SHAPE[0] and 0 <= u < SHAPE[1] and raw[v, u]:
+            steps, v, u = steps + 1, v + dy, u + dx
+        found.append(steps / heights[y])
+    half = int(fg.WINDOW * heights[y] + 0.3)
+    for across, down in fg.OFFSETS:
+        v, u = int(np.floor(y + down * heights[y] + 0.5)), int(np.floor(x + across * heights[y] + 0.5))
+        rows, columns = (window(middle, half, limit) for middle, limit in zip((v, u), SHAPE, strict=True))
+        found += [part[np.ix_(rows, columns)].mean() for part in (capped, edges)]
+    return found
+
+
+@settings(max_examples=40, deadline=None)
+@given(Images, Images, Masks, st.floats(3, 40), st.floats(0, 2), st.data())
+def test_cues_are_those_of_naive_code(image, background, raw, height, slope, data):
+    heights = height + slope * np.arange(SHAPE[0])
+    y, x = data.draw(st.integers(0, SHAPE[0] - 1)), data.draw(st.integers(0, SHAPE[1] - 1))
+    found = fg.cues(image, background, raw, heights, np.array([y]), np.array([x]))
+    wanted = naive_cues(image, background, raw, heights, y, x)
+    assert found.shape == (1, fg.COUNT)
+    np.testing.assert_allclose(found[0], wanted, rtol=2e-4, atol=2e-4)
+
+
+@settings(max_examples=50, deadline=None)
+@given(Masks)
+def test_candidates_have_a_fifth_of_foreground_around(raw):
+    wide = np.pad(raw, fg.NEAR // 2)
+    for y, x in np.ndindex(*SHAPE):
+        dense = wide[y : y + fg.NEAR, x : x + fg.NEAR].sum() >= fg.DENSE * fg.NEAR**2
+        assert fg.candidates(raw)[y, x] == dense
+
+
+@settings(max_examples=50, deadline=None)
+@given(Masks, st.floats(1, 60), st.floats(0, 6))
+def test_squares_cover_the_candidates_and_are_as_wide_as_vehicles_are_large(mask, height, slope):
+    heights = height + slope * np.arange(SHAPE[0])
+    rows, columns, numbers = fg.blocks(mask, heights)
+    assert ((numbers >= 0) == mask).all()
+    assert len(rows) == len(columns) == len(np.unique(numbers[mask]))
+    for k in range(len(rows)):
+        ys, xs = np.nonzero(numbers == k)
+        # Each lies about its middle, and begins where one of its width does.
+        width = max(int(heights[: ys.min() + 1].max() // fg.BLOCK), 1)
+        assert np.ptp(ys) < width
+        assert np.ptp(xs) < width
+        assert len({int(x) // width for x in xs}) == 1
+        assert abs(rows[k] - ys).max() <= width
+        assert abs(columns[k] - xs).max() <= width
+
+
+def rider(rng, *, side):
+    """A road with a pattern; on it a dark rider, and beside it the shadow that it casts: where is which."""
+    road = np.clip(120 + 6 * rng.standard_normal((120, 160, 1)) + np.zeros(3), 0, 255)
+    image = road.copy()
+    shadow, body = np.zeros((120, 160), bool), np.zeros((120, 160), bool)
+    body[40:80, 72:88] = True
+    columns = slice(88, 110) if side > 0 else slice(50, 72)
+    shadow[66:80, columns] = True
+    image[shadow] *= 0.55
+    image[40:60, 72:88] = (150, 40, 45)
+    image[60:80, 72:88] = (35, 35, 38)
+    image[40:47, 76:84] = (225, 220, 215)
+    return image, road, body, shadow
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_rider_stays_and_its_shadow_goes(side):
+    rng = np.random.default_rng(2)
+    image, road, body, shadow = rider(rng, side=side)
+    noisy = np.clip(image + rng.normal(0, 1.5, image.shape), 0, 255).astype(np.uint8)
+    trees = learnt("tracker.motorcycle_lane", "foreground")
+    found = clean(fg.vehicles(noisy, road.astype(np.uint8), body | shadow, np.full(120, 40.0), trees))
+    assert found[body].mean() > 0.8
+    assert found[shadow].mean() < 0.2
+    assert found[~body & ~shadow].mean() < 0.01
+
+
+def test_what_was_missed_within_a_rider_is_given_back():
+    rng = np.random.default_rng(3)
+    image, road, body, _ = rider(rng, side=1)
+    raw = body & (rng.uniform(size=body.shape) < 0.6)
+    trees = learnt("tracker.motorcycle_lane", "foreground")
+    found = fg.vehicles(image.astype(np.uint8), road.astype(np.uint8), raw, np.full(120, 40.0), trees)
+    assert found[body].mean() > 0.85
+
+
+def test_nothing_is_found_where_nothing_differs():
+    picture = np.full((60, 80, 3), 90, np.uint8)
+    trees = learnt("tracker.motorcycle_lane", "foreground")
+    none = np.zeros((60, 80), bool)
+    assert not fg.vehicles(picture, picture, none, np.full(60, 20.0), trees).any()
