@@ -24,7 +24,9 @@ from tracker.motorcycle_lane.tables import (
     PAIR,
     Table,
     all_same,
+    approach,
     evidence,
+    fade,
     found_anew,
     learn,
     totals,
@@ -212,12 +214,13 @@ class BackgroundModel:
             if self._frames == p.start_frames:
                 self._settle()
             mask = self._step(image)
-            flash = mask.mean() > self._calm + p.flash_share and not self.training
+            share = np.count_nonzero(mask) / mask.size
+            flash = share > self._calm + p.flash_share and not self.training
             self._flashing = self._flashing + 1 if flash else 0
             if self._flashing == p.flash_frames:
                 mask = self._begin_again(image, mask)
             if self._flashing == 0:
-                self._foreground, self._calm = mask, float(mask.mean())
+                self._foreground, self._calm = mask, np.count_nonzero(mask) / mask.size
         self._frames += 1
         return mask.reshape(self._shape)
 
@@ -241,10 +244,9 @@ class BackgroundModel:
         rate = np.float32(max(p.rate, 1.0 / (self._frames + 1)))
         self._earlier *= one - rate
         self._factor *= one - rate
-        self._p_b += rate * (background - self._p_b)
+        approach(self._p_b, background, rate)
         if self._conditional:
-            self._factor_shared *= np.where(background, one - rate, one)
-            grow_shared = background * (rate / self._factor_shared)
+            grow_shared = fade(self._factor_shared, background, rate)
         else:
             grow_shared = background * (rate / self._factor)
         for kind, table, feature, tolerance, floor in self._kinds(features):

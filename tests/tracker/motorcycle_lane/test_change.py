@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tests.tracker.motorcycle_lane.twin import sobel
 from tracker.motorcycle_lane.change import carry, differences, histogram, keep
 from tracker.motorcycle_lane.features import extract
+from tracker.motorcycle_lane.tables import approach, fade
 
 HEIGHT, WIDTH = 7, 9
 SEEDS = st.integers(0, 10_000)
@@ -62,3 +63,18 @@ def test_background_image_is_kept_and_carried(seed):
     carry(background, ~seen, light)
     wanted[~seen] = np.minimum(wanted[~seen] * light, np.float32(255.0))
     assert np.array_equal(background.T, wanted)
+
+
+@given(SEEDS)
+@settings(max_examples=50, deadline=None)
+def test_background_pixels_fade_and_grow_likelier(seed):
+    rng = np.random.default_rng(seed)
+    factors, p_b = rng.uniform(0.01, 1.0, (2, 40)).astype(np.float32)
+    seen, rate = rng.random(40) < 0.5, np.float32(0.005)
+    faded = [f * (1 - rate) if s else f for f, s in zip(factors, seen, strict=True)]
+    grown = [rate / f if s else 0.0 for f, s in zip(faded, seen, strict=True)]
+    likely = [p + rate * (np.float32(s) - p) for p, s in zip(p_b, seen, strict=True)]
+    assert np.array_equal(fade(factors, seen, rate), grown)
+    assert np.array_equal(factors, faded)
+    approach(p_b, seen, rate)
+    assert np.array_equal(p_b, likely)
