@@ -17,7 +17,9 @@ POSITION: Floats = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 
 def transition(step: float) -> Floats:
     """Return (4, 4) F of ``step`` seconds."""
-    return np.kron(np.eye(2), np.array([[1.0, step], [0.0, 1.0]]))
+    return np.array(
+        [[1.0, step, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, step], [0.0, 0.0, 0.0, 1.0]]
+    )
 
 
 def process_noise(step: float, intensity: float | Floats) -> Floats:
@@ -28,8 +30,9 @@ def process_noise(step: float, intensity: float | Floats) -> Floats:
         intensity: Power spectral density of the white acceleration, units^2 / s^3; more lets targets turn
             and brake harder, and widens the gates.
     """
-    along = np.array([[step**3 / 3, step**2 / 2], [step**2 / 2, step]])
-    return np.asarray(intensity * np.kron(np.eye(2), along))
+    a, b, c = step**3 / 3, step**2 / 2, step
+    along = np.array([[a, b, 0.0, 0.0], [b, c, 0.0, 0.0], [0.0, 0.0, a, b], [0.0, 0.0, b, c]])
+    return np.asarray(intensity * along)
 
 
 def predict(

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.motorcycle_lane.change import carry, corner, differences, keep, unhide
+from tracker.motorcycle_lane.change import carry, corner, differences, histogram, keep, unhide
 from tracker.motorcycle_lane.features import Features, extract
 from tracker.motorcycle_lane.tables import (
     COLOUR,
@@ -24,7 +24,9 @@ from tracker.motorcycle_lane.tables import (
     PAIR,
     Table,
     all_same,
+    approach,
     evidence,
+    fade,
     found_anew,
     learn,
     totals,
@@ -150,9 +152,9 @@ class BackgroundModel:
             Table.empty(p.gradients[1], pixels),
             Table.empty(p.pairs[1], pixels),
         )
-        self._background = np.zeros((pixels, 3), np.float32)
+        self._background = np.zeros((3, pixels), np.float32)
         self._picture: NDArray[np.uint8] | None = None  # the same in bytes, once it is asked for
-        self._previous = np.zeros((pixels, 3), np.uint8)
+        self._previous = np.zeros(pixels, np.uint32)
         # p(b) of each pixel: one for all tables, since all learn from the same frames.
         self._p_b = np.zeros(pixels, np.float32)
         self._factor = np.float32(1.0)
@@ -170,7 +172,8 @@ class BackgroundModel:
     def background(self) -> NDArray[np.uint8]:
         """The background image, (H, W, 3) RGB."""
         if self._picture is None:
-            self._picture = self._background.round().astype(np.uint8).reshape(*self._shape, 3)
+            channels = self._background.round().astype(np.uint8).reshape(3, *self._shape)
+            self._picture = np.asarray(cv2.merge(tuple(channels)))
         return self._picture
 
     @property
@@ -211,13 +214,13 @@ class BackgroundModel:
             if self._frames == p.start_frames:
                 self._settle()
             mask = self._step(image)
-            flash = mask.mean() > self._calm + p.flash_share and not self.training
+            share = np.count_nonzero(mask) / mask.size
+            flash = share > self._calm + p.flash_share and not self.training
             self._flashing = self._flashing + 1 if flash else 0
             if self._flashing == p.flash_frames:
                 mask = self._begin_again(image, mask)
             if self._flashing == 0:
-                self._foreground, self._calm = mask, float(mask.mean())
-        self._previous = image.reshape(-1, 3).copy()
+                self._foreground, self._calm = mask, np.count_nonzero(mask) / mask.size
         self._frames += 1
         return mask.reshape(self._shape)
 
@@ -225,25 +228,25 @@ class BackgroundModel:
         """Classify a frame, then learn from it; returns the foreground (P,)."""
         self._picture = None
         p, one = self.parameters, np.float32(1.0)
-        pixels, features = image.reshape(-1, 3), extract(image, self._previous.reshape(image.shape))
-        far, moved, far_counts, moved_counts = differences(pixels, self._background, self._previous)
-        is_far = far > corner(far_counts, p.least_change, p.most_change)
-        is_moved = moved > corner(moved_counts, p.least_change, p.most_change)
+        features = extract(image, self._previous)
+        far, moved = differences(features[0], self._background, self._previous)
+        self._previous = features[0]
+        is_far = far > corner(histogram(far), p.least_change, p.most_change)
+        is_moved = moved > corner(histogram(moved), p.least_change, p.most_change)
         changed = is_far if p.uncovered else is_far | is_moved
         background = self._classify(features, changed, is_moved)
         found = ~background
         foreground = self._with_rims(found, changed) if p.rims else found
         background = ~foreground
-        light = keep(self._background, pixels, background, changed, p.image_rate)
+        light = keep(self._background, features[0], background, changed, p.image_rate)
         if p.follow_light:
             carry(self._background, foreground, light)
         rate = np.float32(max(p.rate, 1.0 / (self._frames + 1)))
         self._earlier *= one - rate
         self._factor *= one - rate
-        self._p_b += rate * (background - self._p_b)
+        approach(self._p_b, background, rate)
         if self._conditional:
-            self._factor_shared *= np.where(background, one - rate, one)
-            grow_shared = background * (rate / self._factor_shared)
+            grow_shared = fade(self._factor_shared, background, rate)
         else:
             grow_shared = background * (rate / self._factor)
         for kind, table, feature, tolerance, floor in self._kinds(features):
@@ -251,7 +254,7 @@ class BackgroundModel:
         if not self.training:
             self._turn_once_off(np.flatnonzero(foreground))
             if p.revise and self._frames * p.rate < 1.0:
-                self._revise(pixels, features, np.flatnonzero(found))
+                self._revise(image, features, np.flatnonzero(found))
         self._take_in()
         return found
 
@@ -309,11 +312,11 @@ class BackgroundModel:
             turn(table, at, used, self._p_b[at], self._factor, self._shared_factors(at))
         self._p_b[at] = 1.0 - self._p_b[at]
 
-    def _revise(self, pixels: NDArray[np.uint8], features: Features, at: NDArray[np.int64]) -> None:
+    def _revise(self, image: NDArray[np.uint8], features: Features, at: NDArray[np.int64]) -> None:
         """Make background of what a pixel shows now and has shown most often: traffic had stood there.
 
         Args:
-            pixels: (P, 3) uint8.
+            image: (H, W, 3) RGB.
             features: Of the frame.
             at: Pixels that are foreground.
         """
@@ -327,7 +330,7 @@ class BackgroundModel:
         whole /= self._shared_factors(at)
         for kind, table, feature, tolerance, floor in self._kinds(features):
             found_anew(kind, table, feature, at, whole, tolerance, floor)
-        self._background[at] = pixels[at]
+        self._background[:, at] = image.reshape(-1, 3)[at].T
 
     def _shared_factors(self, at: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the common factor of p(v|b) of some pixels."""
@@ -335,11 +338,13 @@ class BackgroundModel:
 
     def _begin(self, image: NDArray[np.uint8]) -> None:
         """Take a frame for background, the only thing that each pixel has ever shown."""
-        for table, feature in zip(self._tables, extract(image, image), strict=True):
+        features = extract(image)
+        for table, feature in zip(self._tables, features, strict=True):
             table.seen[: table.used] = 0.0
             table.features[0] = feature
             table.seen[0] = table.shared[0] = 1.0
-        self._background[:], self._picture = image.reshape(-1, 3), None
+        self._background[:], self._picture = image.reshape(-1, 3).T, None
+        self._previous = features[0]
         self._p_b[:] = 1.0
         self._factor, self._earlier = np.float32(1.0), np.float32(0.0)
         self._conditional = False
@@ -356,7 +361,6 @@ class BackgroundModel:
             return mask
         shown = unhide(image, self.background, self._foreground.reshape(self._shape))
         self._begin(shown)
-        self._previous = shown.reshape(-1, 3)
         self._conditional = self.parameters.mode is StatMode.CONDITIONAL
         self._factor_shared[:] = 1.0
         self._frames = self.parameters.start_frames

@@ -34,6 +34,8 @@ class ClutterMap:
 
     def add_nothing(self, places: Floats, counts: Floats) -> None:
         """Take in places (N, 2), px, where so often (N,) something was measured that was no rider."""
+        if not len(places):
+            return
         cells = self._cells(places)
         for step in np.ndindex(3, 3):
             x, y = (cells + step - 1).T

@@ -118,6 +118,23 @@ def count_inside(labels, boxes, regions):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def owners(labels, numbers, doubtful):  # type: ignore[no-untyped-def]
+    """Return (H, W) int32 the number of each pixel's region, or -1 where it is 0 and the pixel doubtful.
+
+    Args:
+        labels: (H, W) int32, region k has k + 1.
+        numbers: (N + 1,) int32 by label; 0 is nobody's.
+        doubtful: (H, W) bool.
+    """
+    found = np.empty(labels.shape, np.int32)
+    for y in range(labels.shape[0]):
+        for x in range(labels.shape[1]):
+            number = numbers[labels[y, x]]
+            found[y, x] = -1 if number == 0 and doubtful[y, x] else number
+    return found
+
+
+@njit(cache=True)
 def core_boxes(labels, boxes):  # type: ignore[no-untyped-def]
     """Return the boxes (N, 4) of labelled regions without what sticks out: rests of shadows, and specks.
 
@@ -264,8 +281,7 @@ class Measurer:
                 joined=joined,
             )
         ]
-        owner = numbers[blobs.labels] if apart else blobs.labels
-        owner = np.where((owner == 0) & sight.doubtful, -1, owner)
+        owner = owners(blobs.labels, numbers, sight.doubtful) if apart else blobs.labels
         for number, (tracks, regions) in enumerate(apart):
             x0, y0 = blobs.boxes[regions, :2].min(0)
             x1, y1 = blobs.boxes[regions, 2:].max(0)

@@ -167,6 +167,34 @@ def totals(table, at, first):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def approach(p_b, is_background, rate):  # type: ignore[no-untyped-def]
+    """Let p(b) (P,) of each pixel follow whether it is background (P,), in place: eq. (10)."""
+    for i in range(p_b.size):
+        p_b[i] += rate * (np.float32(is_background[i]) - p_b[i])
+
+
+@njit(cache=True, error_model="numpy")
+def fade(factors, is_background, rate):  # type: ignore[no-untyped-def]
+    """Let what was learnt of background pixels fade, in place, and return by how much the newest grows.
+
+    Args:
+        factors: (P,) float32, common factors of p(v|b).
+        is_background: (P,) bool; the others stay as they are.
+        rate: float32, alpha.
+
+    Returns:
+        (P,) float32, rate / factor of background pixels, 0 of others, as `learn` takes it.
+    """
+    nothing, whole = np.float32(0.0), np.float32(1.0)
+    grow = np.empty(factors.size, np.float32)
+    for i in range(factors.size):
+        factors[i] *= whole - rate if is_background[i] else whole
+        part = rate / factors[i]
+        grow[i] = part if is_background[i] else nothing
+    return grow
+
+
+@njit(cache=True)
 def learn(kind, table, features, grow, grow_shared, tolerance, floor):  # type: ignore[no-untyped-def]
     """Count one feature of each pixel: eqs. (10), (11), after the common factors have faded.
 

@@ -126,6 +126,8 @@ class TrackArrays:
 
     def keep(self, kept: NDArray[np.bool_]) -> None:
         """Drop all but some."""
+        if kept.all():
+            return
         for field in fields(self):
             setattr(self, field.name, getattr(self, field.name)[kept])
 

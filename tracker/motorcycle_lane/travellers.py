@@ -8,6 +8,7 @@ known of riders yet, nor on how slowly it goes; and what only flickers or trembl
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from tracker.blobs import Blobs
@@ -64,12 +65,21 @@ def only_pairs(
         old: How many regions there were.
         new: How many there are.
     """
-    both = (before > 0) & (now > 0)
-    pairs = (before[both].astype(np.int64) - 1) * new + now[both] - 1
-    overlaps = np.bincount(pairs, minlength=old * new).reshape(old, new) > 0
+    overlaps = _overlaps(before, now, old, new)
     only = overlaps & (overlaps.sum(1) == 1)[:, None] & (overlaps.sum(0) == 1)[None]
     one, other = np.nonzero(only)
     return one, other
+
+
+@njit(cache=True)
+def _overlaps(before, now, old, new):  # type: ignore[no-untyped-def]
+    """Return (old, new) whether regions of two frames have a pixel in common."""
+    found = np.zeros((old, new), np.bool_)
+    for y in range(now.shape[0]):
+        for x in range(now.shape[1]):
+            if now[y, x] > 0 and before[y, x] > 0:
+                found[before[y, x] - 1, now[y, x] - 1] = True
+    return found
 
 
 def _sizes(boxes: Floats) -> Floats:

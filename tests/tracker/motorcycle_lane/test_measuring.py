@@ -147,3 +147,13 @@ def test_a_rider_that_nobody_expects_is_found_beside_one_that_is():
     assert worth > 0.6
     assert np.hypot(x - truth[1, 0], y - truth[1, 1]) < 4.0
     assert not len(silhouettes.unexplained(shape, groups, 1, window, truth, sizes, *line, 0.2, 4))
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=20, deadline=None)
+def test_pixels_belong_to_the_group_of_their_region_or_are_doubtful(seed):
+    rng = np.random.default_rng(seed)
+    labels, doubtful = rng.integers(0, 5, (6, 7), np.int32), rng.random((6, 7)) < 0.5
+    numbers = np.array([0, *rng.integers(0, 3, 4)], np.int32)
+    wanted = np.where((numbers[labels] == 0) & doubtful, -1, numbers[labels])
+    assert np.array_equal(measuring.owners(labels, numbers, doubtful), wanted)
