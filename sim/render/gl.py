@@ -20,6 +20,7 @@ from sim.render.programs import program, set_uniforms
 from sim.render.shadows import HEIGHTS, KINDS, ShadowPass
 from sim.render.silhouettes import PLOT, Drawn, SilhouettePass
 from sim.render.sky import HIGHEST, panorama, screen_grid
+from sim.render.still import StillGround
 from sim.render.types import Picture, Silhouettes, Stage
 from sim.render.view import look_matrix, view_matrices
 from sim.textures import texture_array
@@ -140,7 +141,7 @@ class GlRenderer:
             self._light_up(self._body, burning, pose, _BODY_LIGHTS)
             self._pool.draw(ctx, camera, pose)
             self._pool.use(6, 7)
-        self._main_pass(ctx, view, (len(commands), len(stretches)), pose)
+        self._main_pass(ctx, view, (len(commands), len(stretches)), camera, pose)
         self._contact_pass(ctx, view, contacts(state.vehicles, pose))
         self._sky_pass(ctx, camera, pose)
         self._halo_pass(ctx, view, halos(burning, camera, night=self._stage.light.night)[:ROOM])
@@ -163,7 +164,9 @@ class GlRenderer:
         self._shadows.draw(ctx, self._library, bodies, camera, pose)
         set_uniforms(self._body, u_slide=self._shadows.slide(camera, pose), u_ground=-float(pose.position[2]))
 
-    def _main_pass(self, ctx: Any, view: dict[str, Any], draws: tuple[int, int], pose: Pose) -> None:
+    def _main_pass(
+        self, ctx: Any, view: dict[str, Any], draws: tuple[int, int], camera: Camera, pose: Pose
+    ) -> None:
         self._target.use()
         ctx.enable_only(ctx.DEPTH_TEST | ctx.CULL_FACE)
         ctx.front_face = "cw"
@@ -178,8 +181,16 @@ class GlRenderer:
         self._shadows.use(3)
         self._marks.use(5)
         self._body_array.render_indirect(self._commands, count=draws[0])
-        self._paved_array.render_indirect(self._ground_commands, count=draws[1])
-        self._land_array.render_indirect(self._ground_commands, count=draws[1], first=draws[1])
+        self._ground_draws = draws[1]
+        if self._still is not None:
+            self._still.draw(self._target, self._shadows, camera, pose, self._lighting)
+        else:
+            self._paint_ground()
+
+    def _paint_ground(self) -> None:
+        count = self._ground_draws
+        self._paved_array.render_indirect(self._ground_commands, count=count)
+        self._land_array.render_indirect(self._ground_commands, count=count, first=count)
 
     def _sky_pass(self, ctx: Any, camera: Camera, pose: Pose) -> None:
         self._over.use()
@@ -355,6 +366,8 @@ class GlRenderer:
             set_uniforms(shader, u_paved=stage.ground.paved, u_margin=MARGIN, u_wet=light.wet)
             set_uniforms(shader, u_frame=tuple(map(float, self._size)))
         set_uniforms(self._sky, u_highest=HIGHEST)
+        # At night lamps that pass light it.
+        self._still = None if light.night else keep(StillGround(ctx, self._size, self._paint_ground))
         self._pool = keep(PoolPass(ctx, self._size, light.wet)) if light.night else None
         for shader in (self._body, *([self._pool.program] if self._pool is not None else [])):
             set_uniforms(shader, u_beam=_BEAM, u_street=float(self._streets))

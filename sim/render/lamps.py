@@ -88,6 +88,9 @@ class LampPlan:
         ahead = offset @ pose.rotation[2]
         near = (ahead > -20.0) & (ahead < 0.5 * camera.far)
         rows = np.flatnonzero(near & ((bodies.lamps != 0) | streets))
+        if not len(rows):
+            level, nothing = np.zeros(0), np.zeros((0, 3))
+            return Burning(position=nothing, direction=nothing, colour=nothing, power=level, strength=level)
         lamps, models = bodies.lamps[rows], bodies.models[rows]
         scale = bodies.sizes[rows] / self._sizes[models]
         cos, sin = np.cos(bodies.yaws[rows]), np.sin(bodies.yaws[rows])

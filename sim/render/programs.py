@@ -35,9 +35,8 @@ def program(ctx: Any, vertex: str, fragment: str, *defines: str, shared: tuple[s
 def set_uniforms(program: Any, **values: Any) -> None:
     """Set the uniforms that the program uses; the compiler may have dropped some."""
     for name, value in values.items():
-        if name in program:
-            member = program[name]
-            if isinstance(value, bytes):
-                member.write(value)
-            else:
-                member.value = value
+        member = program.get(name, None)  # found at once; `in` would go through all of them
+        if isinstance(value, bytes) and member is not None:
+            member.write(value)
+        elif member is not None:
+            member.value = value
