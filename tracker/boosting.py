@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-FIRST, HOPELESS = 40, -4.0
-"""After so many trees whose odds are below that is given up: the others could not save it."""
+FIRST = 40
+"""Trees after which what is settled is asked no more."""
 MOST_LEAVES = 32
 """A tree's leaves have a bit each in a word."""
 
@@ -51,7 +51,7 @@ def _hash(bit):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _sum(found, roots, cues, limits, rights):  # type: ignore[no-untyped-def]
+def _sum(found, low, high, roots, cues, limits, rights):  # type: ignore[no-untyped-def]
     """Add up the trees' leaves for K candidates with the cues (K, C).
 
     All nodes of a tree are asked of all candidates, which takes no branch and several at a time: a
@@ -66,7 +66,7 @@ def _sum(found, roots, cues, limits, rights):  # type: ignore[no-untyped-def]
     before, values = np.zeros(cues.size, np.int64), np.zeros(MOST_LEAVES, np.float32)
     for k in range(roots.size):
         if k == FIRST:
-            alive = np.flatnonzero(result >= HOPELESS)
+            alive = np.flatnonzero((result >= low) & (result <= high))
             columns = columns[:, alive]
             number = alive.size
         root, end = roots[k], roots[k + 1] if k + 1 < roots.size else cues.size
@@ -90,7 +90,17 @@ def _sum(found, roots, cues, limits, rights):  # type: ignore[no-untyped-def]
     return result
 
 
-def log_odds(found: NDArray[np.floating[Any]], weighed_by: Trees) -> Floats:
-    """Return the log odds (K,) of candidates with the cues (K, C)."""
-    result: Floats = _sum(found.astype(np.float32), *weighed_by)
+def log_odds(
+    found: NDArray[np.floating[Any]], weighed_by: Trees, *, settled: tuple[float, float] = (-np.inf, np.inf)
+) -> Floats:
+    """Return the log odds (K,) of candidates with the cues (K, C).
+
+    Args:
+        found: The cues.
+        weighed_by: The trees.
+        settled: Log odds after `FIRST` trees, below the one and above the other of which those of a candidate
+            are good enough as they are.
+    """
+    low, high = settled
+    result: Floats = _sum(found.astype(np.float32), low, high, *weighed_by)
     return result

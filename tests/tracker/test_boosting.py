@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tracker.boosting import FIRST, HOPELESS, MOST_LEAVES, Trees, _hash, _sum, learnt, log_odds
+from tracker.boosting import FIRST, MOST_LEAVES, Trees, _hash, learnt, log_odds
 from tracker.in_car.cues import COUNT as OUTLINE_CUES
 from tracker.motorcycle_lane.foreground import COUNT as PIXEL_CUES
 
@@ -26,11 +26,11 @@ def leaf(grown, node, row):
     return leaf(grown, node + 1 if left else grown.rights[node], row)
 
 
-def walk(grown, row):
-    """Add up the trees one by one; give up where the first ones leave no hope."""
+def walk(grown, row, low=-np.inf, high=np.inf):
+    """Add up the trees one by one, but only the first ones where those settle it."""
     total = 0.0
     for number, root in enumerate(grown.roots):
-        if number == FIRST and total < HOPELESS:
+        if number == FIRST and not low <= total <= high:
             return total
         total += leaf(grown, root, row)
     return total
@@ -68,7 +68,9 @@ def test_sums_are_those_of_a_walk_through_random_trees(seed, count):
     rng = np.random.default_rng(seed)
     grown = grow(rng, count)
     found = rng.normal(0.0, 1.0, (20, COUNT)).astype(np.float32)
-    np.testing.assert_allclose(_sum(found, *grown), [walk(grown, row) for row in found], atol=1e-9)
+    for settled in ((-np.inf, np.inf), (-0.5, np.inf), (-0.3, 0.4)):
+        wanted = [walk(grown, row, *settled) for row in found]
+        np.testing.assert_allclose(log_odds(found, grown, settled=settled), wanted, atol=1e-9)
 
 
 @pytest.mark.parametrize(("package", "name", "count"), LEARNT)
@@ -87,7 +89,7 @@ def test_learnt_trees_are_well_formed(package, name, count):
 
 
 @pytest.mark.parametrize(("package", "name", "count"), LEARNT)
-def test_learnt_trees_are_walked_and_given_up(package, name, count):
+def test_learnt_trees_are_walked(package, name, count):
     rng = np.random.default_rng(3)
     grown = learnt(package, name)
     # Near the limits that the trees ask for, so that all branches are taken.
@@ -97,21 +99,6 @@ def test_learnt_trees_are_walked_and_given_up(package, name, count):
     np.testing.assert_allclose(odds, [walk(grown, row) for row in found.astype(np.float32)], atol=1e-9)
     assert (odds < 0.0).any()
     assert (odds > 0.0).any()
-
-
-def test_what_the_first_trees_leave_no_hope_is_given_up():
-    stump = Trees(*(np.zeros(0, kind) for kind in (np.int32, np.int16, np.float32, np.int32)))
-    for _ in range(FIRST + 20):
-        one = Trees(
-            np.array([len(stump.cues)], np.int32),
-            np.array([0, -1, -1], np.int16),
-            np.array([0.0, HOPELESS / FIRST - 0.01, HOPELESS / FIRST + 0.01], np.float32),
-            np.array([len(stump.cues) + 2, 0, 0], np.int32),
-        )
-        stump = Trees(*(np.concatenate(parts) for parts in zip(stump, one, strict=True)))
-    odds = log_odds(np.array([[-1.0], [1.0]]), stump)
-    steps = np.array([FIRST, FIRST + 20]) * (HOPELESS / FIRST + np.array([-0.01, 0.01]))
-    np.testing.assert_allclose(odds, steps, rtol=1e-5)
 
 
 def test_every_leaf_has_a_place_of_its_own():

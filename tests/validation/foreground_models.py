@@ -22,7 +22,6 @@ from scenarios.score.frames import scored_frames
 from scenarios.score.summary import DEFAULTS
 from tracker.blobs import clean
 from tracker.motorcycle_lane.background import PAPER, BackgroundModel
-from tracker.motorcycle_lane.shade import STANDING, expectation, shadow_of
 from tracker.motorcycle_lane.tracker import MotorcycleLaneTracker
 from tracker.types import Diagnostics, Frame, Info, Tracks
 
@@ -60,20 +59,8 @@ class MaskOnly:
         return Tracks.none()
 
 
-def ours(info: Info) -> Apply:
-    """Our model and its shadow removal, where nobody is expected."""
-    model = BackgroundModel(info.width, info.height)
-    odds = expectation(STANDING, np.zeros((0, 4)), info.height, info.width)
-
-    def apply(image: NDArray[np.uint8]) -> Mask:
-        raw = model.apply(image)
-        return raw & ~shadow_of(image, model.background, raw, odds)
-
-    return apply
-
-
 def tracking(info: Info) -> Apply:
-    """What our tracker shows: it knows where to expect riders."""
+    """What our tracker shows: trees tell riders from shadows, at the size that riders turn out to have."""
     tracker = MotorcycleLaneTracker()
     tracker.start(info)
     ticks = count()
@@ -99,7 +86,6 @@ def opencv(make: Callable[[], cv2.BackgroundSubtractor]) -> Callable[[Info], App
 
 MODELS: dict[str, Callable[[Info], Apply]] = {
     "tracker": tracking,
-    "ours": ours,
     "ours, shadows kept": lambda info: BackgroundModel(info.width, info.height).apply,
     "as printed": lambda info: BackgroundModel(info.width, info.height, PAPER).apply,
     "MOG2": opencv(cv2.createBackgroundSubtractorMOG2),

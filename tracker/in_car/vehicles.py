@@ -28,6 +28,8 @@ LOWEST, HIGHEST = -6.0, 5.0
 # Log odds of a single outline: at which a vehicle is begun; which neither raise nor lower a vehicle's; and
 # what one look may add or take.
 BEGIN, EVEN, MOST = 0.5, -1.0, 4.0
+# Below these odds after the first trees the others could not save it.
+HOPELESS = -4.0
 # The odds at which it is begun if its points agree, and sums of their log odds: so many speak for it, so few
 # against.
 AGREED, MANY, FEW = -0.5, 12.0, 1.0
@@ -181,7 +183,7 @@ class VehicleStore:
             return
         seen = points.position[ripe], moved[ripe], points.evidence[ripe]
         measured, windows = cues(relief, found, *seen)
-        odds = log_odds(measured, self._trees)
+        odds = log_odds(measured, self._trees, settled=(HOPELESS, np.inf))
         self.sighting = Sighting(boxes=windows, cues=measured, odds=odds)
         # Of the two roofs the likelier.
         count = len(found)

@@ -41,6 +41,8 @@ OFFSETS = np.array(
 """Where around a pixel its surroundings are looked at, in heights of a vehicle, to the right and down."""
 WINDOW = 0.06
 """Half the width of what is averaged there, in heights of a vehicle."""
+SETTLED = -1.0, 1.0
+"""Log odds after the first trees beyond which the others hardly ever (1 in 700) change the sign."""
 OWN = 9
 """Cues of the pixel itself."""
 COUNT = OWN + 2 * len(OFFSETS)
@@ -49,39 +51,63 @@ BRIGHTEST = 3.0
 """Ratio to the background above which it does not matter how bright a pixel is."""
 DIM = 10.0
 """Grey levels that are added where brightness divides."""
+UNIT = 256
+"""Whole numbers that make 1 where averages are taken."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def differences(now, then):  # type: ignore[no-untyped-def]
     """Compare a picture with the background.
 
     Args:
-        now: (H, W, 3) float32, the picture, averaged over 3 x 3 pixels.
-        then: (H, W, 3) float32, the background image, likewise.
+        now: (3, H, W) uint8, the channels of the picture, averaged over 3 x 3 pixels.
+        then: (3, H, W) uint8, those of the background image, likewise.
 
     Returns:
-        (H, W) float32, how many times as bright it is, the mean of the channels; and (H, W) float32, how
+        (2, H, W) int32, in parts of `UNIT`: how many times as bright it is, the mean of the channels; and how
         steep its brightness is, less what the background's pattern accounts for, as a share of it, 1 at most.
     """
-    height, width, _ = now.shape
+    _, height, width = now.shape
     ratios = np.empty((height, width), np.float32)
     grey, ground = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
-    one, three = np.float32(1.0), np.float32(3.0)
+    found = np.zeros((2, height, width), np.int32)
+    one, three, unit = np.float32(1.0), np.float32(3.0), np.float32(UNIT)
     for y in range(height):
         for x in range(width):
-            r, g, b = now[y, x]
-            s, h, c = then[y, x]
+            r, g, b = np.float32(now[0, y, x]), np.float32(now[1, y, x]), np.float32(now[2, y, x])
+            s, h, c = np.float32(then[0, y, x]), np.float32(then[1, y, x]), np.float32(then[2, y, x])
             ratio = ((r + one) / (s + one) + (g + one) / (h + one) + (b + one) / (c + one)) / three
             ratios[y, x] = min(ratio, np.float32(BRIGHTEST))
             grey[y, x], ground[y, x] = (r + g + b) / three, (s + h + c) / three
-    edges = np.zeros((height, width), np.float32)
+        for x in range(width):
+            found[0, y, x] = np.int32(unit * ratios[y, x])
     for y in range(1, height - 1):
         for x in range(1, width - 1):
             ratio = ratios[y, x]
             across = grey[y, x + 1] - grey[y, x - 1] - ratio * (ground[y, x + 1] - ground[y, x - 1])
             down = grey[y + 1, x] - grey[y - 1, x] - ratio * (ground[y + 1, x] - ground[y - 1, x])
-            edges[y, x] = min(np.sqrt(across * across + down * down) / (grey[y, x] + np.float32(DIM)), one)
-    return ratios, edges
+            edge = np.sqrt(across * across + down * down) / (grey[y, x] + np.float32(DIM))
+            found[1, y, x] = np.int32(unit * min(edge, one))
+    return found
+
+
+@njit(cache=True)
+def integrals(maps):  # type: ignore[no-untyped-def]
+    """Return (C, H + 1, W + 1) int32, the sums of what is above and left of each corner in maps (C, H, W).
+
+    They may overflow; sums over windows, which are differences of four, do not (two's complement).
+    """
+    count, height, width = maps.shape
+    found = np.zeros((count, height + 1, width + 1), np.int32)
+    for c in range(count):
+        for y in range(height):
+            total = np.int32(0)
+            for x in range(width):
+                total = np.int32(total + maps[c, y, x])
+                found[c, y + 1, x + 1] = total
+            for x in range(width):
+                found[c, y + 1, x + 1] += found[c, y, x + 1]
+    return found
 
 
 @njit(cache=True)
@@ -109,17 +135,24 @@ def _bounds(middle, half, limit):  # type: ignore[no-untyped-def]
     return low, max(min(middle + half + 1, limit), low + 1)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gather(now, then, sums, reached, heights, rows, columns, offsets):  # type: ignore[no-untyped-def]
-    """Return (N, COUNT) the cues of pixels; ``sums`` (2, H + 1, W + 1) are of ratios and edges."""
-    height, width, _ = now.shape
+    """Return (N, COUNT) the cues of pixels; ``sums`` (2, H + 1, W + 1) are `integrals` of `differences`."""
+    _, height, width = now.shape
     found = np.empty((rows.size, OWN + 2 * offsets.shape[0]), np.float32)
+    across, down = np.empty(offsets.shape[0], np.int64), np.empty(offsets.shape[0], np.int64)
+    last, half, tall = -1, 0, 0.0
     for n in range(rows.size):
         y, x = rows[n], columns[n]
-        tall = heights[y]
-        r, g, b = now[y, x]
-        red, green = (r + 1.0) / (then[y, x, 0] + 1.0), (g + 1.0) / (then[y, x, 1] + 1.0)
-        blue = (b + 1.0) / (then[y, x, 2] + 1.0)
+        if y != last:
+            last, tall = y, heights[y]
+            half = int(WINDOW * tall + 0.3)
+            for k in range(offsets.shape[0]):
+                across[k] = int(np.floor(offsets[k, 0] * tall + 0.5))
+                down[k] = int(np.floor(offsets[k, 1] * tall + 0.5))
+        r, g, b = float(now[0, y, x]), float(now[1, y, x]), float(now[2, y, x])
+        red, green = (r + 1.0) / (then[0, y, x] + 1.0), (g + 1.0) / (then[1, y, x] + 1.0)
+        blue = (b + 1.0) / (then[2, y, x] + 1.0)
         ratio = (red + green + blue) / 3.0
         most = max(r, g, b)
         found[n, 0] = ratio
@@ -129,14 +162,14 @@ def _gather(now, then, sums, reached, heights, rows, columns, offsets):  # type:
         found[n, 4] = r + g + b
         for k in range(4):
             found[n, 5 + k] = reached[y, x, k] / tall
-        half = int(WINDOW * tall + 0.3)
         for k in range(offsets.shape[0]):
-            left, right = _bounds(int(np.floor(x + offsets[k, 0] * tall + 0.5)), half, width)
-            top, bottom = _bounds(int(np.floor(y + offsets[k, 1] * tall + 0.5)), half, height)
-            area = (right - left) * (bottom - top)
+            left, right = _bounds(x + across[k], half, width)
+            top, bottom = _bounds(y + down[k], half, height)
+            scale = 1.0 / (UNIT * ((right - left) * (bottom - top)))
             for c in range(2):
-                total = sums[c, bottom, right] - sums[c, top, right] - sums[c, bottom, left]
-                found[n, OWN + 2 * k + c] = (total + sums[c, top, left]) / area
+                total = np.int32(sums[c, bottom, right] - sums[c, top, right])
+                total = np.int32(np.int32(total - sums[c, bottom, left]) + sums[c, top, left])
+                found[n, OWN + 2 * k + c] = total * scale
     return found
 
 
@@ -158,8 +191,8 @@ def cues(
         rows: (N,) of the pixels.
         columns: (N,) of them.
     """
-    now, then = (cv2.blur(picture.astype(np.float32), (3, 3)) for picture in (image, background))
-    sums = np.stack([cv2.integral(part, sdepth=cv2.CV_64F) for part in differences(now, then)])
+    now, then = (np.stack(cv2.split(cv2.blur(picture, (3, 3)))) for picture in (image, background))
+    sums = integrals(differences(now, then))
     found: NDArray[np.float32] = _gather(now, then, sums, reaches(raw), heights, rows, columns, OFFSETS)
     return found
 
@@ -225,6 +258,6 @@ def vehicles(image: Image, background: Image, raw: Mask, heights: Floats, trees:
         trees: That weigh the cues.
     """
     rows, columns, numbers = blocks(candidates(raw), heights)
-    odds = log_odds(cues(image, background, raw, heights, rows, columns), trees)
+    odds = log_odds(cues(image, background, raw, heights, rows, columns), trees, settled=SETTLED)
     # The last entry is that of pixels in no square.
     return np.append(odds > 0.0, False)[numbers]

@@ -20,7 +20,7 @@ class Sight:
     Attributes:
         image: (H, W, 3) RGB.
         mask: (H, W) foreground, cleaned.
-        doubtful: (H, W) what was foreground, too, but was taken for shadow.
+        doubtful: (H, W) what was foreground, too, but was told to be no vehicle.
         blobs: Its regions.
     """
 

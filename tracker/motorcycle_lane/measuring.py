@@ -36,11 +36,12 @@ LEAST_SEEN = 0.25
 LEAST_OWN = 0.15
 """Share of a silhouette that must be foreground which no other explains: less is no sign of a rider."""
 MOST_ADDED = 4
-CORE, FEET = 0.12, 0.3
-"""Least share of a box that a row or column of a region's core fills; lowest share, where shadows lie."""
+CORE, FEET = 0.04, 0.1
+"""Least share of a box that a row or column of a region's core fills; lowest share of it, where the rest of
+a shadow lies."""
 DRAWN = 0.3
 """Share of a row that must be doubtful for a rider to reach down to it."""
-EATEN = 0.75
+EATEN = 1.0
 """What the median filter takes off each end of a rider, px."""
 TRAINING = 15
 """Frames in which it is not yet known what each pixel shows most often, nor then what is a rider."""

@@ -39,6 +39,8 @@ SMOOTHING = 2.5
 """By so many bins the sizes of single riders differ."""
 ASPECT, ASPECT_SPREAD = 0.45, 0.35
 """Width of a machine with its rider over their height, from front or back; and its logarithm's spread."""
+OTHERS = 0.15
+"""Share of lanes on which most vehicles are no motorcycles, but of any other aspect."""
 # By so many samples about the voted lines each fitted one is held.
 _HELD = np.diag([3.0, 3.0])
 
@@ -144,7 +146,8 @@ def _voted(places: Floats, sizes: Floats, height: float) -> Floats:
         centres = [low[k] + VOTE * (np.arange(n) + 0.5) for k, n in enumerate((across, down))]
         off = (centres[0][None] - centres[1][:, None] - np.log(ASPECT)) / ASPECT_SPREAD
         slope = (centres[1][:, None] - np.log(USUAL_SLOPE * height)) / SLOPE_SPREAD
-        smooth *= np.exp(-0.5 * (off**2 + slope**2 + ((horizon - USUAL_HORIZON) / HORIZON_SPREAD) ** 2))
+        smooth *= OTHERS + (1.0 - OTHERS) * np.exp(-0.5 * off**2)
+        smooth *= np.exp(-0.5 * (slope**2 + ((horizon - USUAL_HORIZON) / HORIZON_SPREAD) ** 2))
         if smooth.max() > most:
             most = float(smooth.max())
             row, column = np.unravel_index(smooth.argmax(), smooth.shape)

@@ -88,7 +88,7 @@ class MotorcycleLaneTracker(EpisodeTracker):
         )
 
     def _look(self, image: NDArray[np.uint8]) -> Sight:
-        """Return what is neither background nor a shadow on it."""
+        """Return what of the picture is a vehicle."""
         raw = self._background.apply(image)
         heights = self._measurer.sizes.sizes(np.arange(len(raw), dtype=float))[:, 1]
         return look(image, raw, vehicles(image, self._background.background, raw, heights, self._trees))

@@ -9,9 +9,11 @@ import pytest
 from tests.tracker.motorcycle_lane.lane import HEIGHT, RATE, WIDTH, Rider, draw
 from tracker import registry
 from tracker.blobs import clean
+from tracker.boosting import learnt
 from tracker.boxes import iou
-from tracker.motorcycle_lane import shade
 from tracker.motorcycle_lane.background import PAPER, BackgroundModel
+from tracker.motorcycle_lane.foreground import vehicles
+from tracker.motorcycle_lane.tracker import MotorcycleLaneTracker
 from tracker.types import Frame, Info, Status
 
 NAMES = ("motorcycle-lane", "motorcycle-lane:paper", "motorcycle-lane:mog2-nn")
@@ -137,16 +139,14 @@ def test_an_episode_again_after_another_is_the_same(name, video):
 def test_masks_are_the_background_models(video):
     frames = [image for image, _ in video[:70]]
     ours, printed = BackgroundModel(WIDTH, HEIGHT), BackgroundModel(WIDTH, HEIGHT, PAPER)
-    shown, paper = follow(NAMES[0], frames), follow(NAMES[1], frames)
-    nobody = np.full((HEIGHT, WIDTH), shade.ELSEWHERE, np.float32)
-    waiting = True
-    for image, (tracks, default), (_, plain) in zip(frames, shown, paper, strict=True):
+    tracker, trees = MotorcycleLaneTracker(), learnt("tracker.motorcycle_lane", "foreground")
+    tracker.start(INFO)
+    for k, (image, (_, plain)) in enumerate(zip(frames, follow(NAMES[1], frames), strict=True)):
         raw = ours.apply(image)
-        if waiting:
-            shadow = shade.shadow_of(image, ours.background, raw, nobody)
-            assert np.array_equal(default.mask, clean(raw & ~shadow))
-        assert not (default.mask & ~clean(raw, largest_hole=2000)).any()
-        waiting &= not len(tracks)
+        heights = tracker._measurer.sizes.sizes(np.arange(HEIGHT, dtype=float))[:, 1]
+        tracker.step(Frame(image=image, tick=k, time=k / RATE))
+        chosen = vehicles(image, ours.background, raw, heights, trees)
+        assert np.array_equal(tracker.diagnostics.mask, clean(chosen))
         assert np.array_equal(plain.mask, clean(printed.apply(image)))
 
 
