@@ -67,7 +67,11 @@ class HiddenVehicles:
 
     def add(self, track: Track, trajectories: Trajectories) -> None:
         """Take in a track that is no longer seen."""
-        track.forecast = self._forecaster(trajectories, track.path)
+        track.forecast, track.hidden = self._forecaster(trajectories, track.path), None
+        self.restore(track)
+
+    def restore(self, track: Track) -> None:
+        """Take in a track with a forecast, which goes on."""
         self.tracks.append(track)
         self._unlikely[track.id], self._beliefs[track.id] = 0, Belief()
 

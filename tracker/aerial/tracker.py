@@ -8,6 +8,7 @@ place and looks, all at once, before it gets its id.
 from __future__ import annotations
 
 import itertools
+from collections import deque
 from collections.abc import Sequence
 
 import cv2
@@ -225,6 +226,13 @@ class AerialTracker:
         for track in lost:
             if self._known(track):
                 self._hidden.add(track, self._trajectories)
+        for track in before:
+            old = track.hidden
+            if track.id not in going and old is not None and not self._known(track):
+                # It was seen too briefly to have been that one for sure.
+                if old.path in self._trajectories:
+                    self._trajectories.cut(old.path, old.since)
+                self._hidden.restore(old)
 
     def _known(self, track: Track) -> bool:
         """Tell whether a track is a vehicle for sure, and can be forecast."""
@@ -265,8 +273,8 @@ class AerialTracker:
             track.path = old.path
         track.id = old.id
         track.size = np.maximum(track.size, 0.9 * old.size)
-        old.pictures.extend(track.pictures)
-        track.pictures = old.pictures
+        track.hidden = old
+        track.pictures = deque([*old.pictures, *track.pictures], old.pictures.maxlen)
 
     def _cut_off(self, shown: Floats) -> NDArray[np.bool_]:
         """Tell which rectangles (N, 4, 2) of the picture touch its border."""

@@ -66,6 +66,8 @@ class Track:
         pictures: What it looked like, (D,) each.
         forecast: Of a track that is not seen.
         since: Last tick at which it was seen, or, of a track that is not seen, of its path.
+        hidden: What was known of it while it was not seen, if it was: who is lost again too soon may not have
+            been that one.
     """
 
     id: int
@@ -82,6 +84,7 @@ class Track:
     pictures: deque[Floats] = field(default_factory=lambda: deque(maxlen=appearance.MEMORY))
     forecast: Forecast | None = None
     since: int = 0
+    hidden: Track | None = None
 
     @property
     def centre(self) -> Floats:

@@ -190,6 +190,38 @@ def test_a_known_vehicle_that_loses_its_outline_to_another_one_is_hidden(frames,
         assert bool(before & {track.id for track in where}) == settled
 
 
+def test_who_is_lost_again_at_once_is_still_expected(frames, monkeypatch):
+    """What comes out from under the bridge lasts for a few frames: it may not have been that vehicle."""
+
+    def nothing(*arguments):
+        own, lost, left = outline(*arguments)
+        return replace(own, pixels=np.zeros_like(own.pixels)), np.zeros_like(lost), np.zeros_like(left)
+
+    tracker, expected, back = AerialTracker(), {}, set()
+    tracker.start(INFO)
+    for k, image in enumerate(frames):
+        if not back:
+            expected = {track.id: track for track in tracker._hidden.tracks}
+        else:
+            monkeypatch.setattr("tracker.aerial.tracker.outline", nothing)
+        tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+        going = {track.id for track in tracker._tracks if track.confirmed}
+        if back and not going:
+            break
+        back = back or going & set(expected)
+    assert back
+    again = {track.id: track for track in tracker._hidden.tracks}
+    for number in back:
+        old = expected[number]
+        assert again[number].forecast is old.forecast
+        assert tracker._trajectories.extent(old.path)[1] == old.since
+    # What comes out later may be it.
+    monkeypatch.setattr("tracker.aerial.tracker.outline", outline)
+    for later in range(k + 1, FRAMES):
+        tracker.step(Frame(image=frames[later], tick=later, time=later / 30.0))
+    assert back <= {track.id for track in tracker._tracks if track.confirmed}
+
+
 @pytest.mark.parametrize("double", [False, True])
 def test_the_path_of_who_seemed_to_stand_ends_before(frames, monkeypatch, double):
     tracker = AerialTracker()
