@@ -155,8 +155,7 @@ class BackgroundModel:
         self._background = np.zeros((3, pixels), np.float32)
         self._picture: NDArray[np.uint8] | None = None  # the same in bytes, once it is asked for
         self._previous = np.zeros(pixels, np.uint32)
-        # p(b) of each pixel: one for all tables, since all learn from the same frames.
-        self._p_b = np.zeros(pixels, np.float32)
+        self._p_b = np.zeros(pixels, np.float32)  # one for all tables: all learn from the same frames
         self._factor = np.float32(1.0)
         self._factor_shared = np.ones(pixels, np.float32)
         # Whether p(v|b) has a factor of its own, by pixel: in conditional mode once the training is over.
@@ -245,12 +244,10 @@ class BackgroundModel:
         self._earlier *= one - rate
         self._factor *= one - rate
         approach(self._p_b, background, rate)
-        if self._conditional:
-            grow_shared = fade(self._factor_shared, background, rate)
-        else:
-            grow_shared = background * (rate / self._factor)
+        grow = rate / self._factor
+        grow_shared = fade(self._factor_shared, background, rate) if self._conditional else background * grow
         for kind, table, feature, tolerance, floor in self._kinds(features):
-            learn(kind, table, feature, rate / self._factor, grow_shared, tolerance, floor)
+            learn(kind, table, feature, grow, grow_shared, tolerance, floor)
         if not self.training:
             self._turn_once_off(np.flatnonzero(foreground))
             if p.revise and self._frames * p.rate < 1.0:
