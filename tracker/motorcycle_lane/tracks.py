@@ -55,7 +55,7 @@ LONGEST_MISS = 1.0
 SAME = 0.6
 """IoU from which a track that is not confirmed, or was missed, is the other's double."""
 CONFIRMED, CONFIRMING_HITS = 0.9, 3
-MOVED, ENTERED = 0.4, 0.12
+MOVED, ENTERED = 0.2, 0.12
 """Rider heights that a track must have gone to be confirmed: leaves sway, and lights flicker, in place. Less
 is asked of one that began at the border, where riders come from."""
 IN_FRAME, ENOUGH_IN_FRAME = 0.15, 0.3
