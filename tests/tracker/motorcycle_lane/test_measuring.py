@@ -31,6 +31,16 @@ def test_sizes_are_those_of_the_single_ones(seed):
         assert np.abs((lines[0] + lines[1] * place) / wanted - 1.0).max() < 0.12
 
 
+def test_where_cars_go_sizes_are_theirs_and_not_those_of_the_one_cyclist():
+    rng = np.random.default_rng(5)
+    places = rng.uniform(0.1, 0.9, 480)
+    cars = np.arange(480) < 440
+    heights = np.where(cars, 60.0, 80.0) * (places + 0.17) * np.exp(rng.normal(0.0, 0.1, 480))
+    widths = heights * np.where(cars, 1.15, 0.42) * np.exp(rng.normal(0.0, 0.1, 480))
+    lines = robust_lines(places, np.stack([widths, heights], 1), 240.0)
+    np.testing.assert_allclose(lines[0] + 0.5 * lines[1], [0.67 * 69.0, 0.67 * 60.0], rtol=0.1)
+
+
 def test_sizes_are_known_only_about_rows_that_were_seen():
     model = SizeModel(360, 240)
     assert not model.known(np.array([100.0])).any()
