@@ -34,7 +34,7 @@ def test_sizes_are_those_of_the_single_ones(seed):
 def test_where_cars_go_sizes_are_theirs_and_not_those_of_the_one_cyclist():
     rng = np.random.default_rng(5)
     places = rng.uniform(0.1, 0.9, 480)
-    cars = np.arange(480) < 440
+    cars = np.arange(480) < 415
     heights = np.where(cars, 60.0, 80.0) * (places + 0.17) * np.exp(rng.normal(0.0, 0.1, 480))
     widths = heights * np.where(cars, 1.15, 0.42) * np.exp(rng.normal(0.0, 0.1, 480))
     lines = robust_lines(places, np.stack([widths, heights], 1), 240.0)
