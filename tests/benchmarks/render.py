@@ -65,12 +65,14 @@ def main() -> list[Line]:
             if tick % EVERY == 0:
                 views.append((state, scene.camera, scene.pose(state)))
         equal = []
-        for view in views:
-            fast.finish(fast.begin(*view))
+        for before, view in zip([views[-1], *views[:-1]], views, strict=True):
+            # The camera moves: while it stands, the ground is kept.
+            fast.render(*before)
             slow.render(*view)
             picture = timed(times["GlRenderer.render"], fast.render, *view)
             other = timed(times["PbrRenderer.render"], slow.render, *view)
             timed(times["GlRenderer.silhouettes"], fast.silhouettes, *view)
+            fast.render(*before)
             drawn = timed(times["GlRenderer.begin"], fast.begin, *view)
             timed(times["GlRenderer.finish"], fast.finish, drawn)
             timed(times["Sensor.expose"], sensor.expose, picture, view[0].tick, 20.0)
