@@ -3,7 +3,7 @@
 ``python -m tests.training.foreground`` simulates every lane scenario over seeds that no validation uses, lets
 the background model look, compares each pixel near its foreground with the truth, and writes the trees. The
 background model knows nothing of the trees, so that one round is enough. What is learnt from is kept in a
-folder (2 GB); a lane that is there already is not simulated again. It needs
+folder (1.2 GB); a lane that is there already is not simulated again. It needs
 ``pip install 'testtrack[training]'``.
 """
 
