@@ -42,7 +42,7 @@ OFFSETS = np.array(
 WINDOW = 0.06
 """Half the width of what is averaged there, in heights of a vehicle."""
 SETTLED = -1.0, 1.0
-"""Log odds after the first trees beyond which the others hardly ever (1 in 700) change the sign."""
+"""Log odds after the first trees beyond which the others hardly ever change the sign."""
 OWN = 9
 """Cues of the pixel itself."""
 COUNT = OWN + 2 * len(OFFSETS)

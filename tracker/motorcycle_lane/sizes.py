@@ -57,11 +57,6 @@ class SizeModel:
         # Offset, and slope per picture height, of width and height.
         self._lines = np.array([[0.06 * width, 0.1 * width], [0.0, 0.0]])
 
-    @property
-    def learnt(self) -> bool:
-        """Whether enough was seen for a line."""
-        return bool(self._limits[0] <= self._limits[1])
-
     def known(self, rows: Floats) -> NDArray[np.bool_]:
         """Tell of which rows (N,) enough was seen to tell one rider from two."""
         return np.asarray((self._limits[0] <= rows) & (rows <= self._limits[1]))
