@@ -19,27 +19,31 @@ RATE = 0.1
 
 def fit(
     cues: NDArray[np.floating[Any]],
-    right: NDArray[np.bool_],
+    right: NDArray[np.generic],
     *,
     trees: int,
     leaves: int,
+    objective: str = "binary",
+    rate: float = RATE,
     monotone: Sequence[int] | None = None,
 ) -> Trees:
     """Boost trees.
 
     Args:
         cues: (N, C) of the candidates.
-        right: (N,) which of them are right.
+        right: (N,) which of them are right, or the number that is to be told of each.
         trees: How many.
         leaves: Of a tree at most.
+        objective: LightGBM's name for what is minimised.
+        rate: How much of each step is taken.
         monotone: (C,) 1 for a cue of which more never speaks against a candidate, -1 for one of which more
             never speaks for it; None binds none.
     """
     booster = lightgbm.train(
         {
-            "objective": "binary",
+            "objective": objective,
             "num_leaves": leaves,
-            "learning_rate": RATE,
+            "learning_rate": rate,
             "min_data_in_leaf": 100,
             "lambda_l2": 5.0,
             "monotone_constraints": monotone,
@@ -50,10 +54,10 @@ def fit(
             "seed": 0,
             "verbosity": -1,
         },
-        lightgbm.Dataset(cues.astype(np.float32), right.astype(int)),
+        lightgbm.Dataset(cues.astype(np.float32), right.astype(float)),
         num_boost_round=trees,
     )
-    print(f"{len(right)} candidates, {right.mean():.2f} of them right; fitted.")
+    print(f"{len(right)} candidates, {right.astype(float).mean():.2f} in the mean; fitted.")
     roots: list[int] = []
     nodes: list[list[float]] = []
     for tree in booster.dump_model()["tree_info"]:

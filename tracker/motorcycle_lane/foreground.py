@@ -247,17 +247,36 @@ def blocks(mask: Mask, heights: Floats) -> Blocks:
     return Blocks(*_blocks(mask, np.maximum(heights // BLOCK, 1.0).astype(np.int64)))
 
 
-def vehicles(image: Image, background: Image, raw: Mask, heights: Floats, trees: Trees) -> Mask:
-    """Return (H, W) what near the raw foreground is a vehicle.
+class Weighed(NamedTuple):
+    """What the pixels near the raw foreground are.
+
+    Attributes:
+        squares: (N) that are decided as one.
+        cues: (N, COUNT) what was asked of each.
+        odds: (N,) log odds that it is a vehicle's.
+    """
+
+    squares: Blocks
+    cues: NDArray[np.float32]
+    odds: Floats
+
+    @property
+    def vehicles(self) -> Mask:
+        """(H, W) what is a vehicle."""
+        # The last entry is that of pixels in no square.
+        return np.append(self.odds > 0.0, False)[self.squares.numbers]
+
+
+def weigh(image: Image, background: Image, raw: Mask, heights: Floats, trees: Trees) -> Weighed:
+    """Tell what near the raw foreground is a vehicle.
 
     Args:
         image: (H, W, 3) RGB.
-        background: (H, W, 3) RGB, the background image.
+        background: (H, W, 3) RGB, what is there without vehicles.
         raw: (H, W) raw foreground.
         heights: (H,) of a vehicle whose middle is in a row, px.
         trees: That weigh the cues.
     """
-    rows, columns, numbers = blocks(candidates(raw), heights)
-    odds = log_odds(cues(image, background, raw, heights, rows, columns), trees, settled=SETTLED)
-    # The last entry is that of pixels in no square.
-    return np.append(odds > 0.0, False)[numbers]
+    squares = blocks(candidates(raw), heights)
+    found = cues(image, background, raw, heights, squares.rows, squares.columns)
+    return Weighed(squares, found, log_odds(found, trees, settled=SETTLED))

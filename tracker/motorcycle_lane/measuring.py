@@ -17,7 +17,7 @@ from tracker.filtering.matchings import components
 from tracker.motorcycle_lane import colour, silhouettes
 from tracker.motorcycle_lane.front_end import Sight
 from tracker.motorcycle_lane.silhouettes import Silhouette
-from tracker.motorcycle_lane.sizes import SizeModel
+from tracker.motorcycle_lane.sizes import Samples, SizeModel
 from tracker.motorcycle_lane.travellers import Travellers
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ TOO_SHORT = 1.2
 """A region by so much narrower or lower than its track is only a part of the rider."""
 TOO_SMALL = 0.25
 """A region of a smaller share of a rider's box, not at the border, is no rider."""
-LEAST_WORTH = 0.45
+LEAST_WORTH = 0.65
 """How well a silhouette that no track expects must explain foreground."""
 LEAST_SEEN = 0.25
 """Smallest share of a silhouette that must be seen to measure where it is."""
@@ -214,7 +214,7 @@ class Measurer:
     """Measures riders, and learns from those alone how large they are and what shape they have."""
 
     def __init__(self, width: int, height: int) -> None:
-        self.sizes = SizeModel(width, height)
+        self.sizes = SizeModel(height)
         self.silhouette = Silhouette()
         self._travellers = Travellers()
         self._frame = np.array([width, height], float)
@@ -289,7 +289,12 @@ class Measurer:
             found.append(self._explain(owner, number + 1, bins, (x0, y0, x1, y1), expected, tracks, joined))
         travelled = self._travellers.step(blobs, cores, ~at_border)
         if self._frames >= TRAINING:
-            self._learn(blobs.labels, cores, travelled, np.array(moved, np.int64), chosen)
+            boxes = cores[travelled]
+            shown = boxes[:, 2:] - boxes[:, :2] + 2.0 * EATEN
+            self.sizes.learn(Samples(0.5 * (boxes[:, 1] + boxes[:, 3]), shown), travelled=True)
+            for b in np.intersect1d(moved, alone):
+                x0, y0, x1, y1 = cores[b].astype(int)
+                self.silhouette.learn(blobs.labels[y0:y1, x0:x1] == b + 1)
         self._frames += 1
         return _together(found, joined)
 
@@ -353,25 +358,6 @@ class Measurer:
         top = y0 + (0.35 * h_top if y0 > 0 else 0.0)
         bottom = y1 - (0.35 * h_bottom if y1 < self._frame[1] else 0.0)
         return left, top, max(left, right), max(top, bottom)
-
-    def _learn(
-        self,
-        labels: NDArray[np.int32],
-        cores: Floats,
-        travelled: NDArray[np.int64],
-        expected: NDArray[np.int64],
-        alone: NDArray[np.int64],
-    ) -> None:
-        """Learn from regions that travelled, and from those where riders are expected."""
-        samples = np.union1d(travelled, expected)
-        if not len(samples):
-            return
-        boxes = cores[samples]
-        rows, sizes = 0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 2:] - boxes[:, :2] + 2.0 * EATEN
-        self.sizes.learn(rows, sizes, np.isin(samples, travelled))
-        for b in np.intersect1d(expected, alone):
-            x0, y0, x1, y1 = cores[b].astype(int)
-            self.silhouette.learn(labels[y0:y1, x0:x1] == b + 1)
 
 
 def _tell_apart(references: Floats) -> Floats:

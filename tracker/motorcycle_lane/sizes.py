@@ -1,24 +1,33 @@
-"""How large a rider is at which row of the picture, learnt from the regions of the foreground that move.
+"""How large a rider is at which row of the picture, learnt from what is seen of riders.
 
-On a plane seen in perspective sizes grow linearly with the row. A region may hold several riders, or a part
-of one, and shadows; but those that hold one are of one size, while the others are of any. So the line is
-voted for, with one horizon for widths and heights, and then fitted to what lies about it by a redescending
-estimator (Welsch's; Holland, Welsch, Robust regression using iteratively reweighted least-squares, 1977).
+On a plane seen in perspective sizes grow linearly with the row. From the first frame on trees (widths.npz,
+heights.npz; learnt as those of `tracker.motorcycle_lane.foreground`) guess from a pixel's surroundings how
+large its vehicle is, be it alone or in a crowd. Later the regions of the foreground that travel tell it more
+exactly. A region may hold several riders, or a part of one, and shadows; but those that hold one are of one
+size, while the others are of any. So the line is voted for, with one horizon for widths and heights, and then
+fitted to what lies about it by a redescending estimator (Welsch's; Holland, Welsch, Robust regression using
+iteratively reweighted least-squares, 1977).
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from tracker.boosting import Trees, log_odds
+from tracker.motorcycle_lane.foreground import Weighed
 
-CAPACITY = 600
+Floats = NDArray[np.float64]
+GUESSED_KEPT, TRAVELLED_KEPT = 2000, 600
 """Samples of either kind that are kept: the newest."""
-ENOUGH, ENOUGH_TRAVELLED = 30, 40
-"""Samples of both kinds from which on there is a line; those of regions that travelled, from which on they
-alone tell it."""
+ENOUGH, ENOUGH_TRAVELLED = 200, 150
+"""Guesses from which on there is a line; regions that travelled, from which on they alone tell it."""
+SURE, GUESSES = 1.0, 60
+"""Log odds from which on a pixel is asked how large its vehicle is; how many are asked in a frame."""
 BEYOND = 0.4
 """How far beyond the rows that were sampled the line holds, as a share of the picture's height."""
 TOLERANCE = 0.25
@@ -45,17 +54,44 @@ OTHERS = 0.15
 _HELD = np.diag([3.0, 3.0])
 
 
+class Samples(NamedTuple):
+    """Rows (K,) and sizes (K, 2), px."""
+
+    rows: Floats
+    sizes: Floats
+
+    def joined(self, others: Samples, kept: int) -> Samples:
+        """Return the newest of these and others, ``kept`` at most."""
+        return Samples(*(np.concatenate(pair)[-kept:] for pair in zip(self, others, strict=True)))
+
+
+def guessed(seen: Weighed, labels: NDArray[np.int32], heights: Floats, trees: Sequence[Trees]) -> Samples:
+    """Guess from pixels of vehicles how large these are.
+
+    Args:
+        seen: The pixels near the foreground.
+        labels: (H, W) of the regions of the foreground, 0 elsewhere: specks are asked nothing.
+        heights: (H,) that were expected of a vehicle whose middle is in a row when they were weighed, px.
+        trees: Two, for logarithms of a vehicle's width and height, over the height that was expected of it.
+    """
+    inside = labels[seen.squares.rows, seen.squares.columns] > 0
+    sure = np.flatnonzero(inside & (seen.odds > SURE))
+    asked = sure[:: max(-(-len(sure) // GUESSES), 1)]
+    rows = seen.squares.rows[asked]
+    logs = np.stack([log_odds(seen.cues[asked], weighed_by) for weighed_by in trees], 1)
+    return Samples(rows.astype(np.float64), heights[rows, None] * np.exp(logs))
+
+
 class SizeModel:
     """Width and height of a rider as lines over the row of its centre."""
 
-    def __init__(self, width: int, height: int) -> None:
-        self._rows, self._sizes = np.zeros(0), np.zeros((0, 2))
-        self._travelled = np.zeros(0, np.bool_)
+    def __init__(self, height: int) -> None:
         self._scale = float(height)
+        self._guessed = self._travelled = Samples(np.zeros(0), np.zeros((0, 2)))
         self._fresh = 0
         self._limits = np.array([np.inf, -np.inf])
-        # Offset, and slope per picture height, of width and height.
-        self._lines = np.array([[0.06 * width, 0.1 * width], [0.0, 0.0]])
+        # Offset, and slope per picture height, of width and height: those of the usual camera at first.
+        self._lines = USUAL_SLOPE * height * np.outer([-USUAL_HORIZON, 1.0], [ASPECT, 1.0])
 
     def known(self, rows: Floats) -> NDArray[np.bool_]:
         """Tell of which rows (N,) enough was seen to tell one rider from two."""
@@ -74,31 +110,26 @@ class SizeModel:
         top, bottom = self.sizes(np.array([0.0, self._scale]))
         return top, (bottom - top) / self._scale
 
-    def learn(self, rows: Floats, sizes: Floats, travelled: NDArray[np.bool_]) -> None:
-        """Take in regions of a frame.
+    def learn(self, samples: Samples, *, travelled: bool) -> None:
+        """Take in what a frame shows.
 
         Args:
-            rows: (K,) of their centres, px.
-            sizes: (K, 2) their widths and heights, px.
-            travelled: (K,) whether a region was seen to travel (`tracker.motorcycle_lane.travellers`); the
-                others are where a rider is expected that has gone some way. Those are many from the start,
-                but who is expected depends on the sizes.
+            samples: Rows of centres, and sizes.
+            travelled: Whether they are regions that travelled (`tracker.motorcycle_lane.travellers`), else
+                they are guesses. Those are many from the start, yet drawn to what is thought already; so
+                once there are enough of the others, these alone tell.
         """
-        rows, travelled = np.concatenate([self._rows, rows]), np.concatenate([self._travelled, travelled])
-        kept = np.zeros(len(rows), np.bool_)
-        for kind in (travelled, ~travelled):
-            kept[np.flatnonzero(kind)[-CAPACITY:]] = True
-        self._sizes = np.concatenate([self._sizes, sizes])[kept]
-        self._rows, self._travelled = rows[kept], travelled[kept]
-        told = self._travelled
-        if told.sum() < ENOUGH_TRAVELLED:
-            told = np.ones(len(told), np.bool_)
-        self._fresh += len(sizes)
-        if told.sum() >= ENOUGH and self._fresh >= told.sum() // 8:
+        if travelled:
+            self._travelled = self._travelled.joined(samples, TRAVELLED_KEPT)
+        else:
+            self._guessed = self._guessed.joined(samples, GUESSED_KEPT)
+        told = self._travelled if len(self._travelled.rows) >= ENOUGH_TRAVELLED else self._guessed
+        self._fresh += len(samples.rows)
+        if len(told.rows) >= ENOUGH and self._fresh >= len(told.rows) // 8:
             self._fresh = 0
-            self._lines = robust_lines(self._rows[told] / self._scale, self._sizes[told], self._scale)
+            self._lines = robust_lines(told.rows / self._scale, told.sizes, self._scale)
             beyond = BEYOND * self._scale * np.array([-1.0, 1.0])
-            self._limits = np.quantile(self._rows[told], [0.02, 0.98]) + beyond
+            self._limits = np.quantile(told.rows, [0.02, 0.98]) + beyond
 
 
 def robust_lines(places: Floats, sizes: Floats, height: float, rounds: int = 5) -> Floats:

@@ -14,9 +14,11 @@ from tracker.boosting import learnt
 from tracker.motorcycle_lane.background import BackgroundModel
 from tracker.motorcycle_lane.episode import EpisodeTracker
 from tracker.motorcycle_lane.flow import Flow
-from tracker.motorcycle_lane.foreground import vehicles
+from tracker.motorcycle_lane.foreground import weigh
 from tracker.motorcycle_lane.front_end import Sight, look
+from tracker.motorcycle_lane.ground import Ground
 from tracker.motorcycle_lane.measuring import Measurer
+from tracker.motorcycle_lane.sizes import guessed
 from tracker.motorcycle_lane.tracks import TrackStore
 from tracker.types import Association, Diagnostics, Frame, Predictions, Status, Tracks
 
@@ -29,7 +31,10 @@ class MotorcycleLaneTracker(EpisodeTracker):
 
     def _begin(self) -> None:
         self._background = BackgroundModel(self._info.width, self._info.height)
-        self._trees = learnt("tracker.motorcycle_lane", "foreground")
+        self._ground = Ground()
+        self._trees, *self._size_trees = (
+            learnt("tracker.motorcycle_lane", name) for name in ("foreground", "widths", "heights")
+        )
         self._measurer = Measurer(self._info.width, self._info.height)
         self._store = TrackStore(self._info.width, self._info.height, self._info.rate)
         self._flow = Flow(self._info.width, self._info.height, self._info.rate)
@@ -88,10 +93,16 @@ class MotorcycleLaneTracker(EpisodeTracker):
         )
 
     def _look(self, image: NDArray[np.uint8]) -> Sight:
-        """Return what of the picture is a vehicle."""
+        """Return what of the picture is a vehicle, and learn what the road and how large vehicles are."""
         raw = self._background.apply(image)
-        heights = self._measurer.sizes.sizes(np.arange(len(raw), dtype=float))[:, 1]
-        return look(image, raw, vehicles(image, self._background.background, raw, heights, self._trees))
+        ground = self._ground.image(self._background.background)
+        sizes = self._measurer.sizes
+        heights = sizes.sizes(np.arange(len(raw), dtype=float))[:, 1]
+        weighed = weigh(image, ground, raw, heights, self._trees)
+        sight = look(image, raw, weighed.vehicles)
+        sizes.learn(guessed(weighed, sight.blobs.labels, heights, self._size_trees), travelled=False)
+        self._ground.learn(image, raw, sight.mask)
+        return sight
 
     def _clip(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
         limits = np.array([self._info.width, self._info.height] * 2, float)

@@ -142,7 +142,7 @@ def test_a_rider_stays_and_its_shadow_goes(side):
     image, road, body, shadow = rider(rng, side=side)
     noisy = np.clip(image + rng.normal(0, 1.5, image.shape), 0, 255).astype(np.uint8)
     trees = learnt("tracker.motorcycle_lane", "foreground")
-    found = clean(fg.vehicles(noisy, road.astype(np.uint8), body | shadow, np.full(120, 40.0), trees))
+    found = clean(fg.weigh(noisy, road.astype(np.uint8), body | shadow, np.full(120, 40.0), trees).vehicles)
     assert found[body].mean() > 0.7
     assert found[shadow].mean() < 0.25
     assert found[~body & ~shadow].mean() < 0.01
@@ -153,7 +153,7 @@ def test_what_was_missed_within_a_rider_is_given_back():
     image, road, body, _ = rider(rng, side=1)
     raw = body & (rng.uniform(size=body.shape) < 0.6)
     trees = learnt("tracker.motorcycle_lane", "foreground")
-    found = fg.vehicles(image.astype(np.uint8), road.astype(np.uint8), raw, np.full(120, 40.0), trees)
+    found = fg.weigh(image.astype(np.uint8), road.astype(np.uint8), raw, np.full(120, 40.0), trees).vehicles
     assert found[body].mean() > raw[body].mean() + 0.1
 
 
@@ -161,4 +161,4 @@ def test_nothing_is_found_where_nothing_differs():
     picture = np.full((60, 80, 3), 90, np.uint8)
     trees = learnt("tracker.motorcycle_lane", "foreground")
     none = np.zeros((60, 80), bool)
-    assert not fg.vehicles(picture, picture, none, np.full(60, 20.0), trees).any()
+    assert not fg.weigh(picture, picture, none, np.full(60, 20.0), trees).vehicles.any()

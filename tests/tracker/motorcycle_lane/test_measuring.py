@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from scenarios import bridge, spec
+from scenarios.loop import make_scene
+from sim.simulation import Simulation
+from tests.tracker.motorcycle_lane.test_foreground import rider
 from tracker.blobs import find_blobs
-from tracker.motorcycle_lane import colour, measuring, silhouettes
-from tracker.motorcycle_lane.sizes import SizeModel, robust_lines
+from tracker.boosting import learnt, log_odds
+from tracker.motorcycle_lane import colour, foreground, measuring, silhouettes
+from tracker.motorcycle_lane.sizes import ENOUGH, GUESSES, SURE, Samples, SizeModel, guessed, robust_lines
+from tracker.motorcycle_lane.tracker import MotorcycleLaneTracker
+from tracker.types import Frame
 
 
 @given(seed=st.integers(0, 10_000))
@@ -42,10 +50,10 @@ def test_where_cars_go_sizes_are_theirs_and_not_those_of_the_one_cyclist():
 
 
 def test_sizes_are_known_only_about_rows_that_were_seen():
-    model = SizeModel(360, 240)
+    model = SizeModel(240)
     assert not model.known(np.array([100.0])).any()
-    rows = np.linspace(60, 120, 40)
-    model.learn(rows, np.stack([0.2 * rows, 0.4 * rows], 1), np.zeros(40, bool))
+    rows = np.linspace(60, 120, ENOUGH)
+    model.learn(Samples(rows, np.stack([0.2 * rows, 0.4 * rows], 1)), travelled=False)
     assert model.known(np.array([-60.0, 20.0, 90.0, 200.0, 230.0])).tolist() == [
         False,
         True,
@@ -56,19 +64,61 @@ def test_sizes_are_known_only_about_rows_that_were_seen():
     assert np.allclose(model.sizes(np.array([90.0])), [[18.0, 36.0]], rtol=0.02)
 
 
-def test_what_travelled_outvotes_what_was_expected():
-    """Tracks on pairs of riders, three times as many as what travelled, do not hold the sizes for ever."""
+def test_what_travelled_outvotes_what_was_guessed():
+    """Guesses that are too large, eight times as many as what travelled, do not hold the sizes for ever."""
     rng = np.random.default_rng(0)
-    model = SizeModel(360, 240)
-    for frame in range(160):
-        rows = rng.uniform(40.0, 200.0, 4)
-        single = np.arange(4) == 0
-        sizes = np.stack([0.2 * rows, 0.4 * rows], 1) * np.where(single, 1.0, 2.5)[:, None]
-        told = slice(0, 4) if frame >= 40 else slice(1, 4)
-        model.learn(rows[told], sizes[told] * rng.normal(1.0, 0.05, (4, 2))[told], single[told])
+    model = SizeModel(240)
+    for frame in range(260):
+        rows = rng.uniform(40.0, 200.0, 9)
+        sizes = np.stack([0.2 * rows, 0.4 * rows], 1) * rng.normal(1.0, 0.05, (9, 2))
+        model.learn(Samples(rows[1:], 2.5 * sizes[1:]), travelled=False)
+        if frame >= 40:
+            model.learn(Samples(rows[:1], sizes[:1]), travelled=True)
         if frame == 40:
             assert np.allclose(model.sizes(np.array([120.0])), [[60.0, 120.0]], rtol=0.1)
     assert np.allclose(model.sizes(np.array([120.0])), [[24.0, 48.0]], rtol=0.1)
+
+
+def test_pixels_that_surely_are_a_vehicles_are_asked_for_sizes():
+    image, road, body, shadow = rider(np.random.default_rng(1), side=1)
+    heights = np.linspace(30.0, 50.0, 120)
+    trees, *size_trees = (
+        learnt("tracker.motorcycle_lane", name) for name in ("foreground", "widths", "heights")
+    )
+    seen = foreground.weigh(image.astype(np.uint8), road.astype(np.uint8), body | shadow, heights, trees)
+    labels = body.astype(np.int32)
+    told = guessed(seen, labels, heights, size_trees)
+    squares = seen.squares
+    sure = np.flatnonzero((seen.odds > SURE) & body[squares.rows, squares.columns])
+    assert GUESSES // 2 < len(told.rows) <= GUESSES < len(sure) < (seen.odds > SURE).sum()
+    wanted = {}
+    for square in sure:
+        row = seen.squares.rows[square]
+        logs = [log_odds(seen.cues[square : square + 1], weighed_by)[0] for weighed_by in size_trees]
+        wanted.setdefault(row, []).append(heights[row] * np.exp(logs))
+    for row, size in zip(told.rows, told.sizes, strict=True):
+        assert any(np.allclose(size, one) for one in wanted[row])
+
+
+@pytest.mark.parametrize("wrong", [0.7, 1.4])
+def test_a_lane_tells_how_large_riders_are_whatever_was_expected(wrong):
+    scenario = spec.load("lane-day", ["seconds=4.0"])
+    scene = make_scene(scenario, 31)
+    tracker = MotorcycleLaneTracker()
+    tracker.start(bridge.tracker_info(scene.camera, scenario.rate))
+    sizes = tracker._measurer.sizes
+    sizes._lines *= wrong
+    boxes = []
+    with Simulation(scene, scenario.params.sensor, seed=31) as simulation:
+        for seen in simulation.run(scenario.frames):
+            tracker.step(Frame(image=seen.image, tick=seen.tick, time=seen.time))
+            boxes.append(seen.truth.box_amodal[seen.truth.visible > 0.9])
+    boxes = np.concatenate(boxes)
+    rows, true = 0.5 * (boxes[:, 1] + boxes[:, 3]), boxes[:, 3] - boxes[:, 1]
+    for low in (30.0, 80.0, 130.0):
+        there = (rows > low) & (rows < low + 40.0)
+        assert there.sum() > 20
+        assert abs(np.median(np.log(sizes.sizes(rows[there])[:, 1] / true[there]))) < 0.15
 
 
 @given(seed=st.integers(0, 10_000))

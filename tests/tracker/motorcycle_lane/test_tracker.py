@@ -12,7 +12,8 @@ from tracker.blobs import clean
 from tracker.boosting import learnt
 from tracker.boxes import iou
 from tracker.motorcycle_lane.background import PAPER, BackgroundModel
-from tracker.motorcycle_lane.foreground import vehicles
+from tracker.motorcycle_lane.foreground import weigh
+from tracker.motorcycle_lane.ground import Ground
 from tracker.motorcycle_lane.tracker import MotorcycleLaneTracker
 from tracker.types import Frame, Info, Status
 
@@ -138,15 +139,16 @@ def test_an_episode_again_after_another_is_the_same(name, video):
 
 def test_masks_are_the_background_models(video):
     frames = [image for image, _ in video[:70]]
-    ours, printed = BackgroundModel(WIDTH, HEIGHT), BackgroundModel(WIDTH, HEIGHT, PAPER)
+    ours, printed, ground = BackgroundModel(WIDTH, HEIGHT), BackgroundModel(WIDTH, HEIGHT, PAPER), Ground()
     tracker, trees = MotorcycleLaneTracker(), learnt("tracker.motorcycle_lane", "foreground")
     tracker.start(INFO)
     for k, (image, (_, plain)) in enumerate(zip(frames, follow(NAMES[1], frames), strict=True)):
         raw = ours.apply(image)
         heights = tracker._measurer.sizes.sizes(np.arange(HEIGHT, dtype=float))[:, 1]
         tracker.step(Frame(image=image, tick=k, time=k / RATE))
-        chosen = vehicles(image, ours.background, raw, heights, trees)
-        assert np.array_equal(tracker.diagnostics.mask, clean(chosen))
+        mask = clean(weigh(image, ground.image(ours.background), raw, heights, trees).vehicles)
+        ground.learn(image, raw, mask)
+        assert np.array_equal(tracker.diagnostics.mask, mask)
         assert np.array_equal(plain.mask, clean(printed.apply(image)))
 
 

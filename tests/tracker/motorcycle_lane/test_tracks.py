@@ -33,7 +33,7 @@ def seen_at(place: NDArray[np.float64]) -> Measurements:
 def statuses(ways: NDArray[np.float64]) -> list[Status]:
     """Return a rider's status, frame by frame, who has gone so many rider heights (N,) up the picture."""
     rng = np.random.default_rng(0)
-    store, sizes = TrackStore(WIDTH, HEIGHT, RATE), SizeModel(WIDTH, HEIGHT)
+    store, sizes = TrackStore(WIDTH, HEIGHT, RATE), SizeModel(HEIGHT)
     found = []
     for way in ways:
         store.predict(sizes)

@@ -1,0 +1,96 @@
+"""The road without its traffic: a background image that vehicles leave no traces in.
+
+The background model shows what each pixel has shown most often; where riders are many or slow, that is the
+riders, or their shadows, and who passes over such traces is seen badly. So here whatever is told to be a
+vehicle is left out, and what else is changed leads the image on: upwards at once, as traffic hides a road
+or darkens it, and hardly downwards.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+Image = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
+
+RISE, FALL = 8.0, 0.5
+"""Grey levels a frame by which the image follows a changed pixel that is lighter, and one that is darker."""
+RATE = 0.1
+"""How far it follows a pixel that is not changed, as a share of the difference."""
+START = 16
+"""Frames over which it follows faster at first: in frame n so many n-ths as fast, but no more than..."""
+FASTEST = 0.5
+"""... this share of the difference, where the pixel is not changed."""
+MARGIN = 5
+"""Width of the square around each pixel in which no vehicle may be, px."""
+RELIT = 4.0
+"""Median of the grey levels by which the background model's image changes at once if the light does."""
+
+
+@njit(cache=True)
+def lead(ground, image, held, changed, rise, fall, rate):  # type: ignore[no-untyped-def]
+    """Let the ground, in place, follow a picture.
+
+    Args:
+        ground: (H, W, 3) float32.
+        image: (H, W, 3) uint8.
+        held: (H, W) uint8, not 0 where it stays as it is.
+        changed: (H, W) bool, where it goes up by ``rise`` and down by ``fall`` at most; elsewhere by a share
+            ``rate`` of the difference.
+        rise: float32, as are the others.
+        fall: See above.
+        rate: See above.
+
+    Returns:
+        (H, W, 3) uint8, the ground in bytes.
+    """
+    found = np.empty(ground.shape, np.uint8)
+    for y in range(held.shape[0]):
+        for x in range(held.shape[1]):
+            for c in range(3):
+                if held[y, x] == 0:
+                    off = np.float32(image[y, x, c]) - ground[y, x, c]
+                    ground[y, x, c] += min(max(off, -fall), rise) if changed[y, x] else rate * off
+                found[y, x, c] = np.uint8(ground[y, x, c] + np.float32(0.5))
+    return found
+
+
+class Ground:
+    """The ground of an episode."""
+
+    def __init__(self) -> None:
+        self._exact: Floats = np.zeros((0, 0, 3), np.float32)
+        self._image: Image = np.zeros((0, 0, 3), np.uint8)
+        self._background: Image = self._image
+        self._frames = 0
+
+    def image(self, background: Image) -> Image:
+        """Return (H, W, 3) the ground; the background model's image (H, W, 3) tells of sudden light."""
+        if self._frames == 0 or relit(self._background, background):
+            self._exact, self._image = background.astype(np.float32), background
+        self._background = background
+        return self._image
+
+    def learn(self, image: Image, raw: Mask, vehicles: Mask) -> None:
+        """Take in a picture (H, W, 3), but where there are vehicles (H, W).
+
+        Args:
+            image: RGB.
+            raw: (H, W) raw foreground.
+            vehicles: What of it is a vehicle.
+        """
+        haste = max(1.0, START / (self._frames + 1))
+        held = cv2.dilate(vehicles.view(np.uint8), np.ones((MARGIN, MARGIN), np.uint8))
+        steps = (RISE * haste, FALL * haste, min(RATE * haste, FASTEST))
+        self._image = lead(self._exact, image, held, raw, *map(np.float32, steps))
+        self._frames += 1
+
+
+def relit(before: Image, now: Image) -> bool:
+    """Tell whether most of a background image (H, W, 3) has changed at once."""
+    coarse = np.abs(now[::4, ::4].astype(np.int16) - before[::4, ::4])
+    return bool(np.median(coarse) > RELIT)
