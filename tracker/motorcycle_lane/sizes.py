@@ -24,8 +24,8 @@ from tracker.motorcycle_lane.foreground import Weighed
 Floats = NDArray[np.float64]
 GUESSED_KEPT, TRAVELLED_KEPT = 2000, 600
 """Samples of either kind that are kept: the newest."""
-ENOUGH, ENOUGH_TRAVELLED = 200, 150
-"""Guesses from which on there is a line; regions that travelled, from which on they alone tell it."""
+ENOUGH = 200
+"""Samples of a kind that make a line."""
 SURE, GUESSES = 1.0, 60
 """Log odds from which on a pixel is asked how large its vehicle is; how many are asked in a frame."""
 BEYOND = 0.4
@@ -105,6 +105,14 @@ class SizeModel:
         return np.asarray(np.maximum(self._lines[0] + self._lines[1] * rows[:, None] / self._scale, SMALLEST))
 
     @property
+    def settled(self) -> bool:
+        """Whether regions that travelled tell the line.
+
+        Guesses are many from the start, yet drawn to what is thought already; so from here on none are asked.
+        """
+        return len(self._travelled.rows) >= ENOUGH
+
+    @property
     def line(self) -> tuple[Floats, Floats]:
         """(2,) width and height at row 0, px, and (2,) by how much they grow a row down the picture."""
         top, bottom = self.sizes(np.array([0.0, self._scale]))
@@ -116,14 +124,13 @@ class SizeModel:
         Args:
             samples: Rows of centres, and sizes.
             travelled: Whether they are regions that travelled (`tracker.motorcycle_lane.travellers`), else
-                they are guesses. Those are many from the start, yet drawn to what is thought already; so
-                once there are enough of the others, these alone tell.
+                they are guesses.
         """
         if travelled:
             self._travelled = self._travelled.joined(samples, TRAVELLED_KEPT)
         else:
             self._guessed = self._guessed.joined(samples, GUESSED_KEPT)
-        told = self._travelled if len(self._travelled.rows) >= ENOUGH_TRAVELLED else self._guessed
+        told = self._travelled if self.settled else self._guessed
         self._fresh += len(samples.rows)
         if len(told.rows) >= ENOUGH and self._fresh >= len(told.rows) // 8:
             self._fresh = 0

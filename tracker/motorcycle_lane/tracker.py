@@ -100,7 +100,8 @@ class MotorcycleLaneTracker(EpisodeTracker):
         heights = sizes.sizes(np.arange(len(raw), dtype=float))[:, 1]
         weighed = weigh(image, ground, raw, heights, self._trees)
         sight = look(image, raw, weighed.vehicles)
-        sizes.learn(guessed(weighed, sight.blobs.labels, heights, self._size_trees), travelled=False)
+        if not sizes.settled:
+            sizes.learn(guessed(weighed, sight.blobs.labels, heights, self._size_trees), travelled=False)
         self._ground.learn(image, raw, sight.mask)
         return sight
 

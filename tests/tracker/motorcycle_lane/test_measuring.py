@@ -68,14 +68,16 @@ def test_what_travelled_outvotes_what_was_guessed():
     """Guesses that are too large, eight times as many as what travelled, do not hold the sizes for ever."""
     rng = np.random.default_rng(0)
     model = SizeModel(240)
-    for frame in range(260):
+    for frame in range(320):
         rows = rng.uniform(40.0, 200.0, 9)
         sizes = np.stack([0.2 * rows, 0.4 * rows], 1) * rng.normal(1.0, 0.05, (9, 2))
         model.learn(Samples(rows[1:], 2.5 * sizes[1:]), travelled=False)
         if frame >= 40:
             model.learn(Samples(rows[:1], sizes[:1]), travelled=True)
         if frame == 40:
+            assert not model.settled
             assert np.allclose(model.sizes(np.array([120.0])), [[60.0, 120.0]], rtol=0.1)
+    assert model.settled
     assert np.allclose(model.sizes(np.array([120.0])), [[24.0, 48.0]], rtol=0.1)
 
 
