@@ -29,7 +29,8 @@ from sim.simulation import Simulation
 from sim.world import FIRST_VEHICLE_ID, Bodies, Kind, WorldState
 from tests.training.boosting import fit, write
 from tracker.motorcycle_lane.background import BackgroundModel
-from tracker.motorcycle_lane.foreground import candidates, cues
+from tracker.motorcycle_lane.foreground import DENSE, cues
+from tracker.surroundings import candidates
 
 Floats = NDArray[np.float64]
 
@@ -178,7 +179,7 @@ def samples(kept: Path, seed: int) -> tuple[NDArray[np.float32], NDArray[np.bool
             image, background, raw, true = (
                 np.ascontiguousarray(a[:, ::-1]) for a in (image, background, raw, true)
             )
-        rows, columns = np.nonzero(candidates(raw))
+        rows, columns = np.nonzero(candidates(raw, DENSE))
         chosen = drawn.uniform(size=len(rows)) < PIXELS * rare[rows] / max(rare[rows].sum(), 1e-9)
         rows, columns = rows[chosen], columns[chosen]
         found.append(cues(image, background, raw, guessed, rows, columns))
