@@ -32,8 +32,9 @@ from sim.simulation import Simulation
 from sim.world import FIRST_VEHICLE_ID, Bodies, Kind, WorldState
 from tests.training.boosting import fit, write
 from tracker.motorcycle_lane.background import BackgroundModel
-from tracker.motorcycle_lane.foreground import candidates, cues
+from tracker.motorcycle_lane.foreground import DENSE, cues
 from tracker.motorcycle_lane.ground import Ground
+from tracker.surroundings import candidates
 
 Floats = NDArray[np.float64]
 
@@ -231,7 +232,7 @@ def samples(kept: Path, seed: int) -> Samples:
     rare = np.where(heights < SMALL, 0.2, 1.0) / np.maximum(heights, USUAL) ** 1.5
     found = []
     for picture in pictures(kept, drawn):
-        near = candidates(picture.raw)
+        near = candidates(picture.raw, DENSE)
         guessed = heights * np.exp(drawn.normal(0.0, GUESSED))
         rows, columns = thinned(near, rare, PIXELS, drawn)
         right = picture.numbers[rows, columns] > 0

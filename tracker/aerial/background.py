@@ -4,7 +4,8 @@ A window of the mosaic goes along with the view. Each of its pixels keeps a mean
 deviation and a rival colour. A colour between those of a pixel's neighbours is nothing new: edges never lie
 quite still, and what stands above the ground shifts as the camera moves. The rival takes over once it has
 been seen more often: soon where the first sight was of a vehicle, late elsewhere, and never below a track,
-since vehicles queue.
+since vehicles queue. What changes is much more than vehicles, and is told from them elsewhere
+(`tracker.aerial.foreground`).
 """
 
 from __future__ import annotations
@@ -14,19 +15,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from tracker.aerial.daylight import Daylight
 from tracker.aerial.stabilisation import Floats, transform
 
 MARGIN = 192
 """Px of the mosaic around a view that are kept."""
 LEAST_CHANGE = 8.0
-"""Grey levels of a channel that are always noise ..."""
-LEAST_IN_SHADE = 5.0
-"""... where the ground is in the shade: all there is fainter by as much as the light is."""
+"""Grey levels of a channel that are always noise."""
 DEVIATIONS = 2.5
 """Usual deviations that are noise."""
+FAINT = 0.6
+"""Share of what is more than noise from which on a change may be a vehicle's: in the shade it is faint."""
 NEIGHBOURS = np.ones((3, 3), np.uint8)
 RATE = 1.0 / 50.0
+OFTEN = 1.0 / 64.0
+"""Rate at which it is learnt how often a pixel changes."""
 NEW_SPREAD = 4.0
 """Usual deviation of a new pixel, grey levels."""
 KNOWN = 6
@@ -44,18 +46,11 @@ class Background:
         laid: (h, w, 3) the last picture in the mosaic, cut to ``view``.
         valid: (h, w) where it has anything.
         ground: (h, w, 3) the background image of the view, as it was before that picture.
-        low: (h, w, 3) the darkest of the background about each pixel of the view.
-        high: Likewise the brightest.
-        shade: (h, w) where that background is in the shade.
+        spread: (h, w) float32, usual deviations there, grey levels.
+        often: (h, w) float32, how often each of its pixels changes lately.
     """
 
-    def __init__(self, daylight: Daylight | None = None) -> None:
-        """Begin with nothing known.
-
-        Args:
-            daylight: What is known of the usual light; None is nothing.
-        """
-        self._daylight = daylight or Daylight()
+    def __init__(self) -> None:
         self.origin = np.zeros(2)
         self._mean = np.zeros((0, 0, 3), np.float32)
 
@@ -80,11 +75,8 @@ class Background:
         size = np.array(self._support.shape[::-1])
         low, high = np.clip(low, 0, size), np.clip(high, 0, size)
         self.view = x0, y0, x1, y1 = int(low[0]), int(low[1]), int(high[0]), int(high[1])
-        # OpenCV's pixel centres lie at whole numbers.
         here = self.origin + low
-        move = np.array([[1.0, 0.0, -here[0] - 0.5], [0.0, 1.0, -here[1] - 0.5], [0.0, 0.0, 1.0]])
-        place = move @ to_mosaic @ np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
-        self.laid = cv2.warpPerspective(image, place, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR)
+        self.laid = self.lay(image, to_mosaic)
         inner = corners + 2.0 * np.sign(corners.mean(0) - corners) - here
         valid = np.zeros(self.laid.shape[:2], np.uint8)
         cv2.fillConvexPoly(valid, np.round(inner).astype(np.int32), 1)
@@ -95,23 +87,32 @@ class Background:
         part = np.s_[y0:y1, x0:x1]
         # Rounded to the nearest.
         self.ground = (self._mean[part] + np.float32(0.5)).astype(np.uint8)
-        self.low, self.high = cv2.erode(self.ground, NEIGHBOURS), cv2.dilate(self.ground, NEIGHBOURS)
-        self.shade = self._daylight.shade(self.ground)
+        self.spread, self.often = self._spread[part], self._often[part]
         return np.asarray(
             _compare(
                 self.laid,
                 self.valid,
                 protected,
-                self.low,
-                self.high,
+                cv2.erode(self.ground, NEIGHBOURS),
+                cv2.dilate(self.ground, NEIGHBOURS),
                 self._mean[part],
                 self._spread[part],
                 self._support[part],
                 self._rival[part],
                 self._rivals[part],
-                self.shade,
+                self.often,
             )
         )
+
+    def lay(self, image: NDArray[np.uint8], to_mosaic: Floats) -> NDArray[np.uint8]:
+        """Return (h, w) or (h, w, 3), a picture (H, W) or (H, W, 3) laid onto the mosaic, cut to the view."""
+        x0, y0, x1, y1 = self.view
+        here = self.origin + np.array([x0, y0])
+        # OpenCV's pixel centres lie at whole numbers.
+        move = np.array([[1.0, 0.0, -here[0] - 0.5], [0.0, 1.0, -here[1] - 0.5], [0.0, 0.0, 1.0]])
+        place = move @ to_mosaic @ np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
+        laid = cv2.warpPerspective(image, place, (x1 - x0, y1 - y0), flags=cv2.INTER_LINEAR)
+        return np.asarray(laid, np.uint8)
 
     def mean(self, part: tuple[slice, slice]) -> NDArray[np.float32]:
         """Return (h, w, 3) the background of a part of the view."""
@@ -141,6 +142,7 @@ class Background:
             np.zeros(shape, np.uint8),
             np.zeros((*shape, 3), np.uint8),
             np.zeros(shape, np.uint8),
+            np.zeros(shape, np.float32),
         ]
         if self._mean.size:
             shift = (self.origin - origin).astype(int)
@@ -153,14 +155,15 @@ class Background:
                     ]
         self.origin = origin
         self._mean, self._spread = fresh[0].astype(np.float32, copy=False), fresh[1].astype(np.float32)
-        self._support, self._rival, self._rivals = (a.astype(np.uint8, copy=False) for a in fresh[2:])
+        self._support, self._rival, self._rivals = (a.astype(np.uint8, copy=False) for a in fresh[2:5])
+        self._often = fresh[5].astype(np.float32, copy=False)
 
     def _arrays(self) -> tuple[NDArray[np.generic], ...]:
-        return self._mean, self._spread, self._support, self._rival, self._rivals
+        return self._mean, self._spread, self._support, self._rival, self._rivals, self._often
 
 
 @njit(cache=True)
-def _compare(laid, valid, protected, low, high, mean, spread, support, rival, rivals, shade):  # type: ignore[no-untyped-def]
+def _compare(laid, valid, protected, low, high, mean, spread, support, rival, rivals, often):  # type: ignore[no-untyped-def]
     """Return the foreground (h, w) and learn in place; see `Background`."""
     height, width = valid.shape
     found = np.zeros((height, width), np.bool_)
@@ -178,8 +181,10 @@ def _compare(laid, valid, protected, low, high, mean, spread, support, rival, ri
                 now = np.int32(laid[i, j, c])
                 most = max(most, now - np.int32(high[i, j, c]), np.int32(low[i, j, c]) - now)
                 other = max(other, abs(now - np.int32(rival[i, j, c])))
-            least = LEAST_IN_SHADE if shade[i, j] else LEAST_CHANGE
-            change = least + DEVIATIONS * spread[i, j]
+            change = LEAST_CHANGE + DEVIATIONS * spread[i, j]
+            # What has been seen for a moment only may have been a vehicle.
+            found[i, j] = most > FAINT * change and support[i, j] >= KNOWN
+            often[i, j] += np.float32(OFTEN) * (np.float32(found[i, j]) - often[i, j])
             if most <= change:
                 if support[i, j] < LATE:
                     support[i, j] += 1
@@ -190,8 +195,6 @@ def _compare(laid, valid, protected, low, high, mean, spread, support, rival, ri
                     mean[i, j, c] += rate * (laid[i, j, c] - mean[i, j, c])
                 spread[i, j] += np.float32(0.05) * (most - spread[i, j])
                 continue
-            # What has been seen for a moment only may have been a vehicle.
-            found[i, j] = support[i, j] >= KNOWN
             if protected[i, j] and support[i, j] >= SOON:
                 continue
             if rivals[i, j] == 0 or other > change:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.aerial.appearance import PATCH
-from tracker.aerial.darkening import GREENEST, REDDEST
 
 Floats = NDArray[np.float64]
 
@@ -22,8 +21,6 @@ MEMORY = 200
 """Grounds whose median is the usual one."""
 SHADE = 0.8
 """Share of the usual light below which ground is in the shade."""
-CELL = 4
-"""Side, px, of the ground whose mean tells whether a place is in the shade: lines are narrower."""
 DARKEST = 0.3
 """Least share of a channel's usual light that is made up for."""
 
@@ -33,19 +30,6 @@ class Daylight:
 
     def __init__(self) -> None:
         self._grounds: deque[Floats] = deque(maxlen=MEMORY)
-
-    def shade(self, ground: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Return (H, W) where a background image (H, W, 3) is road in the shade: grey, or bluer."""
-        if not self._grounds:
-            return np.zeros(ground.shape[:2], np.bool_)
-        height, width = ground.shape[:2]
-        small = cv2.resize(ground, (-(-width // CELL), -(-height // CELL)), interpolation=cv2.INTER_AREA)
-        red, green, blue = np.moveaxis(small / np.maximum(self._usual(), 1.0), 2, 0)
-        light = np.maximum((red + green + blue) / 3.0, 0.01)
-        tint, excess = (blue - red) / light, (green - 0.5 * (red + blue)) / light
-        shade = (light < SHADE) & (tint > REDDEST) & (np.abs(excess) < GREENEST)
-        large = cv2.resize(shade.view(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
-        return np.asarray(large.view(np.bool_))
 
     def restore(self, picture: Floats, ground: Floats) -> Floats:
         """Return a picture as it would be in the usual light, which is learnt.

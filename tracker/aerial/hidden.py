@@ -29,10 +29,9 @@ LOST = 0.03
 """Chance that a vehicle that vanishes does not come back at all: it may never have been one."""
 AROUND = 1.5
 """Lengths about a new track in which a hidden vehicle that is not seen may be that one."""
-SCALES = ((0.6, 0.1), (2.0, 2.0))
-"""Least and most that rehearsals make of the usual variances along the way and across it: it is below bridges
-and at their ends that drivers brake, and there nobody can be rehearsed; and what is no vehicle is rehearsed,
-too."""
+SCALES = (0.6, 2.0)
+"""Least and most that rehearsals make of the usual variances: it is below bridges and at their ends that
+drivers brake and change lanes, and nobody can be rehearsed there; what is no vehicle is rehearsed, too."""
 RIM = 10.0
 """Px at the picture's border where nothing is sure to be seen."""
 INSIDE, ENTERING = 2e-5, 4e-5

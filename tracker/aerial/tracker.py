@@ -19,12 +19,12 @@ from tracker.aerial import appearance, tracks
 from tracker.aerial.background import Background
 from tracker.aerial.daylight import Daylight
 from tracker.aerial.forecasts import WINDOW, Forecaster, leads_to, went_until
+from tracker.aerial.foreground import vehicles
 from tracker.aerial.ghosts import contrast
 from tracker.aerial.hidden import HiddenVehicles
 from tracker.aerial.measuring import corners, free_outlines, outline
 from tracker.aerial.motion_context import ContextForecast
 from tracker.aerial.reacquisition import Fusion, Matcher
-from tracker.aerial.shadows import CastShadows
 from tracker.aerial.stabilisation import Floats, Stabiliser, inverse, jacobian, transform
 from tracker.aerial.tracks import Track
 from tracker.aerial.trajectories import Trajectories
@@ -35,8 +35,6 @@ LEAST_AREA = 30
 """Smallest region that begins a track, px."""
 BORDER = 3.0
 """Px from the picture's border within which an outline is cut off."""
-RIM = 0.8
-"""Px by which foreground is longer and wider than what casts it: blur carries it over the ground."""
 MOVED = 0.5
 """Lengths, its own or usual ones, that a track must have gone to be confirmed: what only seems to move
 does not go far."""
@@ -47,8 +45,8 @@ COMPACT = 0.6
 GHOST, CLEAR = -0.4, 0.3
 """Log ratio of gradients along an outline (`tracker.aerial.ghosts`) below which nothing is there, and above
 which a track begins."""
-ENOUGH = 5
-"""Vehicles whose median size is the usual one."""
+ENOUGH, MEMORY = 5, 600
+"""Sizes of vehicles from which on, and up to which, their median is the usual one."""
 SMALLEST = np.array([0.5, 0.5])
 """Length and width, in usual ones, from which on a region may be a vehicle's."""
 LARGEST = np.array([1.4, 1.5])
@@ -78,12 +76,13 @@ class AerialTracker:
         """Forget everything and get ready for an episode."""
         self._info = info
         self._stabiliser, self._daylight = Stabiliser(), Daylight()
-        self._background, self._shadows = Background(self._daylight), CastShadows()
+        self._background = Background()
         self._trajectories = Trajectories()
         self._tracks: list[Track] = []
         self._hidden = HiddenVehicles(self._forecaster, self._matcher, info.width, info.height, info.rate)
         self._ids = itertools.count(1)
         self._tick = -1
+        self._sizes: deque[Floats] = deque(maxlen=MEMORY)
         self._usual = np.zeros(2)
         self._diagnostics = Diagnostics()
 
@@ -109,8 +108,8 @@ class AerialTracker:
     def _look(self, image: NDArray[np.uint8], to_mosaic: Floats) -> Floats:
         """Measure the tracks, begin new ones; return the boxes (M, 4) of all outlines in the picture."""
         kept = _box(_corners([track for track in self._tracks if track.went()]))
-        mask = clean(self._background.apply(image, to_mosaic, kept), window=3)
-        blobs = find_blobs(self._shadows.take_off(self._background, mask), LEAST_AREA // 2)
+        raw = self._background.apply(image, to_mosaic, kept)
+        blobs = find_blobs(clean(vehicles(self._background, raw), window=3), LEAST_AREA // 2)
         origin = self._background.origin + np.array(self._background.view[:2])
         places = np.array([track.state[:, 0] for track in self._tracks]).reshape(-1, 2) - origin
         headings = np.array([track.heading for track in self._tracks]).reshape(-1, 2)
@@ -171,10 +170,10 @@ class AerialTracker:
         known = np.array([track.confirmed and track.whole for track in self._tracks], np.bool_)
         height, width = blobs.labels.shape
         columns, rows = np.clip(places[known].astype(int), 0, [width - 1, height - 1]).T
-        below = blobs.labels[rows, columns]
-        below = below[below > 0]
-        if len(below) > ENOUGH:
-            self._usual = np.median(sizes[below - 1], axis=0)
+        below = np.unique(blobs.labels[rows, columns])
+        self._sizes.extend(sizes[below[below > 0] - 1])
+        if len(self._sizes) > ENOUGH:
+            self._usual = np.median(np.array(self._sizes), axis=0)
         usual = self._usual if self._usual.any() or not len(sizes) else np.median(sizes, axis=0)
         return np.append(False, (sizes <= usual * LARGEST).all(1))
 
@@ -288,7 +287,7 @@ class AerialTracker:
         if not everyone:
             self._diagnostics = Diagnostics(detections=seen, predictions=None, homography=to_mosaic)
             return Tracks.none()
-        boxes = _boxes(transform(to_picture, _corners(everyone, -RIM)))
+        boxes = _boxes(transform(to_picture, _corners(everyone)))
         centres = np.array([track.centre for track in everyone])
         middles, turns = transform(to_picture, centres), jacobian(to_picture, centres)
         velocity = (turns @ np.array([track.velocity for track in everyone])[..., None])[..., 0]
@@ -327,11 +326,11 @@ def _status(track: Track) -> Status:
     return Status.COASTING if track.misses or track.forecast is not None else Status.CONFIRMED
 
 
-def _corners(vehicles: Sequence[Track], wider: float = 0.0) -> Floats:
-    """Return (N, 4, 2) of their rectangles in the mosaic, made wider and longer by so many px."""
+def _corners(vehicles: Sequence[Track]) -> Floats:
+    """Return (N, 4, 2) of their rectangles in the mosaic."""
     places = [(*track.centre, *track.heading, *track.size) for track in vehicles]
     centres, headings, sizes = np.array(places).reshape(-1, 3, 2).swapaxes(0, 1)
-    return corners(centres, headings, np.maximum(sizes + wider, 1.0))
+    return corners(centres, headings, sizes)
 
 
 def _box(points: Floats) -> Floats:

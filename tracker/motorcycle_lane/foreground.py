@@ -21,13 +21,24 @@ from numba import njit
 from numpy.typing import NDArray
 
 from tracker.boosting import Trees, log_odds
+from tracker.surroundings import (
+    DIM,
+    UNIT,
+    Blocks,
+    blocks,
+    bounds,
+    candidates,
+    differences,
+    integrals,
+    reaches,
+)
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
-NEAR, DENSE = 5, 0.2
-"""A pixel is looked at if such a share of the square around it, so wide, px, is foreground."""
+DENSE = 0.2
+"""A pixel is looked at if such a share of what is around it is foreground."""
 BLOCK = 15.0
 """Height of a vehicle, px, for each pixel of the width of the squares that are decided as one."""
 OFFSETS = np.array(
@@ -47,92 +58,6 @@ OWN = 9
 """Cues of the pixel itself."""
 COUNT = OWN + 2 * len(OFFSETS)
 """Cues of a pixel with its surroundings."""
-BRIGHTEST = 3.0
-"""Ratio to the background above which it does not matter how bright a pixel is."""
-DIM = 10.0
-"""Grey levels that are added where brightness divides."""
-UNIT = 256
-"""Whole numbers that make 1 where averages are taken."""
-
-
-@njit(cache=True, error_model="numpy")
-def differences(now, then):  # type: ignore[no-untyped-def]
-    """Compare a picture with the background.
-
-    Args:
-        now: (3, H, W) uint8, the channels of the picture, averaged over 3 x 3 pixels.
-        then: (3, H, W) uint8, those of the background image, likewise.
-
-    Returns:
-        (2, H, W) int32, in parts of `UNIT`: how many times as bright it is, the mean of the channels; and how
-        steep its brightness is, less what the background's pattern accounts for, as a share of it, 1 at most.
-    """
-    _, height, width = now.shape
-    ratios = np.empty((height, width), np.float32)
-    grey, ground = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
-    found = np.zeros((2, height, width), np.int32)
-    one, three, unit = np.float32(1.0), np.float32(3.0), np.float32(UNIT)
-    for y in range(height):
-        for x in range(width):
-            r, g, b = np.float32(now[0, y, x]), np.float32(now[1, y, x]), np.float32(now[2, y, x])
-            s, h, c = np.float32(then[0, y, x]), np.float32(then[1, y, x]), np.float32(then[2, y, x])
-            ratio = ((r + one) / (s + one) + (g + one) / (h + one) + (b + one) / (c + one)) / three
-            ratios[y, x] = min(ratio, np.float32(BRIGHTEST))
-            grey[y, x], ground[y, x] = (r + g + b) / three, (s + h + c) / three
-        for x in range(width):
-            found[0, y, x] = np.int32(unit * ratios[y, x])
-    for y in range(1, height - 1):
-        for x in range(1, width - 1):
-            ratio = ratios[y, x]
-            across = grey[y, x + 1] - grey[y, x - 1] - ratio * (ground[y, x + 1] - ground[y, x - 1])
-            down = grey[y + 1, x] - grey[y - 1, x] - ratio * (ground[y + 1, x] - ground[y - 1, x])
-            edge = np.sqrt(across * across + down * down) / (grey[y, x] + np.float32(DIM))
-            found[1, y, x] = np.int32(unit * min(edge, one))
-    return found
-
-
-@njit(cache=True)
-def integrals(maps):  # type: ignore[no-untyped-def]
-    """Return (C, H + 1, W + 1) int32, the sums of what is above and left of each corner in maps (C, H, W).
-
-    They may overflow; sums over windows, which are differences of four, do not (two's complement).
-    """
-    count, height, width = maps.shape
-    found = np.zeros((count, height + 1, width + 1), np.int32)
-    for c in range(count):
-        for y in range(height):
-            total = np.int32(0)
-            for x in range(width):
-                total = np.int32(total + maps[c, y, x])
-                found[c, y + 1, x + 1] = total
-            for x in range(width):
-                found[c, y + 1, x + 1] += found[c, y, x + 1]
-    return found
-
-
-@njit(cache=True)
-def reaches(mask):  # type: ignore[no-untyped-def]
-    """Return (H, W, 4) int16, how far foreground reaches from a pixel, with it: up, down, left and right."""
-    height, width = mask.shape
-    found = np.zeros((height, width, 4), np.int16)
-    for y in range(height):
-        for x in range(width):
-            if mask[y, x]:
-                found[y, x, 0] = 1 + (found[y - 1, x, 0] if y else 0)
-                found[y, x, 2] = 1 + (found[y, x - 1, 2] if x else 0)
-    for y in range(height - 1, -1, -1):
-        for x in range(width - 1, -1, -1):
-            if mask[y, x]:
-                found[y, x, 1] = 1 + (found[y + 1, x, 1] if y + 1 < height else 0)
-                found[y, x, 3] = 1 + (found[y, x + 1, 3] if x + 1 < width else 0)
-    return found
-
-
-@njit(cache=True)
-def _bounds(middle, half, limit):  # type: ignore[no-untyped-def]
-    """Return where a window begins and ends on an axis; beyond the picture it is its outermost pixel."""
-    low = min(max(middle - half, 0), limit - 1)
-    return low, max(min(middle + half + 1, limit), low + 1)
 
 
 @njit(cache=True, error_model="numpy")
@@ -163,8 +88,8 @@ def _gather(now, then, sums, reached, heights, rows, columns, offsets):  # type:
         for k in range(4):
             found[n, 5 + k] = reached[y, x, k] / tall
         for k in range(offsets.shape[0]):
-            left, right = _bounds(x + across[k], half, width)
-            top, bottom = _bounds(y + down[k], half, height)
+            left, right = bounds(x + across[k], half, width)
+            top, bottom = bounds(y + down[k], half, height)
             scale = 1.0 / (UNIT * ((right - left) * (bottom - top)))
             for c in range(2):
                 total = np.int32(sums[c, bottom, right] - sums[c, top, right])
@@ -197,54 +122,9 @@ def cues(
     return found
 
 
-def candidates(raw: Mask) -> Mask:
-    """Return (H, W) the pixels that may be a vehicle's: those in or near dense raw foreground."""
-    share = cv2.blur(raw.astype(np.float32), (NEAR, NEAR), borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(share > DENSE - 0.5 / NEAR**2)
-
-
-class Blocks(NamedTuple):
-    """Squares of pixels that are decided as one.
-
-    Attributes:
-        rows: (N,) int64 of the middle, which speaks for the square.
-        columns: (N,) int64 of it.
-        numbers: (H, W) int32 the square that a candidate belongs to, -1 elsewhere.
-    """
-
-    rows: NDArray[np.int64]
-    columns: NDArray[np.int64]
-    numbers: NDArray[np.int32]
-
-
-@njit(cache=True)
-def _blocks(mask, widths):  # type: ignore[no-untyped-def]
-    height, width = mask.shape
-    numbers = np.full((height, width), -1, np.int32)
-    rows, columns = np.empty(mask.sum(), np.int64), np.empty(mask.sum(), np.int64)
-    of_column = np.empty(width, np.int32)
-    count, y = 0, 0
-    while y < height:
-        size = widths[y]
-        end = min(y + size, height)
-        of_column[:] = -1
-        for v in range(y, end):
-            for x in range(width):
-                if mask[v, x]:
-                    left = x - x % size
-                    if of_column[left] < 0:
-                        rows[count] = min(y + size // 2, height - 1)
-                        columns[count] = min(left + size // 2, width - 1)
-                        of_column[left] = count
-                        count += 1
-                    numbers[v, x] = of_column[left]
-        y = end
-    return rows[:count], columns[:count], numbers
-
-
-def blocks(mask: Mask, heights: Floats) -> Blocks:
-    """Divide pixels (H, W) into squares, the larger the larger vehicles are in their row (H,)."""
-    return Blocks(*_blocks(mask, np.maximum(heights // BLOCK, 1.0).astype(np.int64)))
+def widths(heights: Floats) -> NDArray[np.int64]:
+    """Return (H,) how wide, px, squares are that are decided as one: the wider the larger vehicles are."""
+    return np.maximum(heights // BLOCK, 1.0).astype(np.int64)
 
 
 class Weighed(NamedTuple):
@@ -277,6 +157,6 @@ def weigh(image: Image, background: Image, raw: Mask, heights: Floats, trees: Tr
         heights: (H,) of a vehicle whose middle is in a row, px.
         trees: That weigh the cues.
     """
-    squares = blocks(candidates(raw), heights)
+    squares = blocks(candidates(raw, DENSE), widths(heights))
     found = cues(image, background, raw, heights, squares.rows, squares.columns)
     return Weighed(squares, found, log_odds(found, trees, settled=SETTLED))

@@ -8,12 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.tracker.aerial.twin import Pixel
-from tracker.aerial.appearance import PATCH
 from tracker.aerial.background import LATE, NEIGHBOURS, Background, _compare
-from tracker.aerial.daylight import Daylight
 
 NONE = np.zeros((0, 4))
-PIXELS = 3 * PATCH[0] * PATCH[1]
 
 
 @settings(max_examples=25, deadline=None)
@@ -23,7 +20,7 @@ def test_every_pixel_is_learnt_as_by_itself(seed):
     height, width, frames = 3, 4, 60
     mean, spread = np.zeros((height, width, 3), np.float32), np.full((height, width), 4.0, np.float32)
     support, rivals = np.zeros((2, height, width), np.uint8)
-    rival = np.zeros((height, width, 3), np.uint8)
+    rival, often = np.zeros((height, width, 3), np.uint8), np.zeros((height, width), np.float32)
     pixels = [[Pixel() for _ in range(width)] for _ in range(height)]
     colours = rng.integers(0, 256, (3, height, width, 3))
     # Each pixel stays with a colour for a while: rivals have their chance.
@@ -32,21 +29,20 @@ def test_every_pixel_is_learnt_as_by_itself(seed):
         laid = np.take_along_axis(colours, which[k][None, ..., None], 0)[0]
         laid = np.clip(laid + rng.integers(-6, 7, laid.shape), 0, 255).astype(np.uint8)
         valid, protected = rng.random((height, width)) < 0.9, rng.random((height, width)) < 0.3
-        shade = rng.random((height, width)) < 0.5
         ground = np.floor(mean + 0.5).astype(np.uint8)
         low, high = cv2.erode(ground, NEIGHBOURS), cv2.dilate(ground, NEIGHBOURS)
-        found = _compare(laid, valid, protected, low, high, mean, spread, support, rival, rivals, shade)
+        found = _compare(laid, valid, protected, low, high, mean, spread, support, rival, rivals, often)
         for i, j in np.ndindex(height, width):
             if valid[i, j]:
-                plain = pixels[i][j].see(
-                    laid[i, j], protected[i, j], low[i, j].astype(int), high[i, j].astype(int), shade[i, j]
-                )
+                bounds = low[i, j].astype(int), high[i, j].astype(int)
+                plain = pixels[i][j].see(laid[i, j], protected[i, j], *bounds)
                 assert found[i, j] == plain
             else:
                 assert not found[i, j]
     for i, j in np.ndindex(height, width):
         assert np.allclose(mean[i, j], pixels[i][j].mean, atol=1e-2)
         assert np.isclose(spread[i, j], pixels[i][j].spread, atol=1e-3)
+        assert np.isclose(often[i, j], pixels[i][j].often, atol=1e-4)
         assert (support[i, j], rivals[i, j]) == (pixels[i][j].support, pixels[i][j].rivals)
     assert support.max() <= LATE
 
@@ -67,23 +63,6 @@ def test_what_comes_onto_a_known_ground_is_new_and_nothing_else():
     expected = np.zeros(found.shape, bool)
     expected[int(20 + y) : int(30 + y), int(30 + x) : int(50 + x)] = True
     assert (found == expected).all()
-
-
-def test_in_the_shade_less_is_new():
-    daylight = Daylight()
-    daylight.restore(np.zeros(PIXELS), np.full(PIXELS, 120.0))
-    background = Background(daylight)
-    ground = np.full((60, 80, 3), 120, np.uint8)
-    ground[:, 40:] = 60
-    for _ in range(60):
-        background.apply(ground, np.eye(3), NONE)
-    seen = ground.copy()
-    seen[20:30, 10:30] += 7
-    seen[20:30, 50:70] += 7
-    x, y = (-np.array(background.view[:2]) - background.origin).astype(int)
-    found = background.apply(seen, np.eye(3), NONE)[y:, x:]
-    assert not found[20:30, 10:30].any()
-    assert found[20:30, 50:70].all()
 
 
 def test_the_window_moves_and_remembers():

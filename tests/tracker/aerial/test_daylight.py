@@ -29,18 +29,6 @@ def test_a_vehicle_in_the_shade_looks_as_in_the_sun():
     assert np.allclose(found, car.reshape(-1), rtol=0.06)
 
 
-def test_ground_is_in_the_shade_where_it_is_much_darker_below_its_lines_too_but_not_soil_or_grass():
-    ground = np.tile(ROAD.astype(np.uint8), (60, 80, 1))
-    assert not Daylight().shade(ground).any()
-    ground[:, 40:] = SHADE * ROAD
-    ground[20, 40:] = SHADE * 230.0
-    ground[40:, :20] = [50, 75, 52]
-    ground[:20, :20] = [60, 50, 35]
-    shade = daylight().shade(ground)
-    assert shade[:, 45:].all()
-    assert not shade[:, :36].any()
-
-
 def test_only_the_part_that_is_in_the_shade_is_made_lighter():
     car, light = np.random.default_rng(2).uniform(20, 240, (*PATCH, 3)), np.ones((*PATCH, 3))
     light[:6] = SHADE

@@ -8,11 +8,12 @@ import numpy as np
 
 from tracker.aerial.background import (
     DEVIATIONS,
+    FAINT,
     KNOWN,
     LATE,
     LEAST_CHANGE,
-    LEAST_IN_SHADE,
     NEW_SPREAD,
+    OFTEN,
     RATE,
     SOON,
 )
@@ -68,22 +69,23 @@ class Pixel:
 
     def __init__(self):
         self.mean, self.spread, self.support = np.zeros(3, np.float32), np.float32(NEW_SPREAD), 0
-        self.rival, self.rivals = np.zeros(3), 0
+        self.rival, self.rivals, self.often = np.zeros(3), 0, 0.0
 
-    def see(self, colour, protected, low, high, shade):
+    def see(self, colour, protected, low, high):
         """Take in a colour (3,), given bounds of the neighbours' means; return whether it is foreground."""
         colour = np.asarray(colour, np.float32)
         if not self.support:
             self.mean, self.support = colour.copy(), 1
             return False
         apart = np.maximum(np.maximum(colour - high, low - colour), 0).max()
-        change = (LEAST_IN_SHADE if shade else LEAST_CHANGE) + DEVIATIONS * self.spread
+        change = LEAST_CHANGE + DEVIATIONS * self.spread
+        foreground = apart > FAINT * change and self.support >= KNOWN
+        self.often += OFTEN * (foreground - self.often)
         if apart <= change:
             self.support, self.rivals = min(self.support + 1, LATE), max(self.rivals - 1, 0)
             self.mean = self.mean + np.float32(max(1 / self.support, RATE)) * (colour - self.mean)
             self.spread = self.spread + np.float32(0.05) * (apart - self.spread)
-            return False
-        foreground = self.support >= KNOWN
+            return foreground
         if not (protected and self.support >= SOON):
             self._weigh(colour, change)
         return foreground

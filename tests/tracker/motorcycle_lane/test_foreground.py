@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from tests.tracker.surroundings import average, differences, reaches, smoothed
 from tracker.blobs import clean
 from tracker.boosting import learnt
 from tracker.motorcycle_lane import foreground as fg
@@ -17,53 +18,19 @@ Images = arrays(np.uint8, (*SHAPE, 3))
 Masks = arrays(np.bool_, SHAPE)
 
 
-def smoothed(picture):
-    """Means over 3 x 3 pixels, the picture mirrored at its border."""
-    wide = np.pad(picture.astype(float), ((1, 1), (1, 1), (0, 0)), mode="reflect")
-    height, width = picture.shape[:2]
-    return np.rint(sum(wide[y : y + height, x : x + width] for y in range(3) for x in range(3)) / 9)
-
-
-def window(middle, half, limit):
-    """What of an axis lies so near; beyond the picture its outermost pixel."""
-    inside = [w for w in range(middle - half, middle + half + 1) if 0 <= w < limit]
-    return inside or [0 if middle < 0 else limit - 1]
-
-
-def floored(part):
-    return np.floor(part.astype(np.float32) * fg.UNIT) / fg.UNIT
-
-
 def naive_cues(image, background, raw, heights, y, x):
     now, then = smoothed(image), smoothed(background)
-    ratios = ((now + 1) / (then + 1)).mean(2)
-    capped = np.minimum(ratios, fg.BRIGHTEST)
-    grey, ground = now.mean(2), then.mean(2)
-    edges = np.zeros(SHAPE)
-    for v in range(1, SHAPE[0] - 1):
-        for u in range(1, SHAPE[1] - 1):
-            steep = [
-                grey[v + dy, u + dx]
-                - grey[v - dy, u - dx]
-                - capped[v, u] * (ground[v + dy, u + dx] - ground[v - dy, u - dx])
-                for dy, dx in ((0, 1), (1, 0))
-            ]
-            edges[v, u] = min(np.hypot(*steep) / (grey[v, u] + fg.DIM), 1)
+    maps = differences(now, then)
     red, green, blue = (now[y, x] + 1) / (then[y, x] + 1)
-    mean = ratios[y, x]
+    mean = (red + green + blue) / 3
     most, least = now[y, x].max(), now[y, x].min()
     found = [mean, (blue - red) / mean, (green - (red + blue) / 2) / mean]
     found += [(most - least) / (most + fg.DIM), now[y, x].sum()]
-    for dy, dx in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-        steps, v, u = 0, y, x
-        while 0 <= v < SHAPE[0] and 0 <= u < SHAPE[1] and raw[v, u]:
-            steps, v, u = steps + 1, v + dy, u + dx
-        found.append(steps / heights[y])
+    found += [steps / heights[y] for steps in reaches(raw, y, x)]
     half = int(fg.WINDOW * heights[y] + 0.3)
     for across, down in fg.OFFSETS:
         v, u = int(np.floor(y + down * heights[y] + 0.5)), int(np.floor(x + across * heights[y] + 0.5))
-        rows, columns = (window(middle, half, limit) for middle, limit in zip((v, u), SHAPE, strict=True))
-        found += [part[np.ix_(rows, columns)].mean() for part in (floored(capped), floored(edges))]
+        found += [average(part, v, u, half) for part in maps]
     return found
 
 
@@ -78,44 +45,25 @@ def test_cues_are_those_of_naive_code(image, background, raw, height, slope, dat
     np.testing.assert_allclose(found[0], wanted, rtol=1e-3, atol=1.1 / fg.UNIT)
 
 
-@given(arrays(np.int32, (2, 5, 6), elements=st.integers(0, 2**31 - 1)))
-def test_integrals_give_the_sums_of_windows_though_they_overflow(maps):
-    small = maps % 1000 + np.where(np.arange(6) < 2, 2**30, 0).astype(np.int32)
-    sums = fg.integrals(small)
-    for top, left in np.ndindex(4, 4):
-        corners = (
-            sums[:, top + 2, left + 2],
-            sums[:, top, left + 2],
-            sums[:, top + 2, left],
-            sums[:, top, left],
-        )
-        window = small[:, top : top + 2, left : left + 2].astype(np.int64).sum((1, 2))
-        total = corners[0] - corners[1] - corners[2] + corners[3]
-        assert (total == window.astype(np.int32)).all()
-
-
-@settings(max_examples=50, deadline=None)
-@given(Masks)
-def test_candidates_have_a_fifth_of_foreground_around(raw):
-    wide = np.pad(raw, fg.NEAR // 2)
-    for y, x in np.ndindex(*SHAPE):
-        dense = wide[y : y + fg.NEAR, x : x + fg.NEAR].sum() >= fg.DENSE * fg.NEAR**2
-        assert fg.candidates(raw)[y, x] == dense
-
-
 @settings(max_examples=50, deadline=None)
 @given(Masks, st.floats(1, 60), st.floats(0, 6))
+@example(np.arange(SHAPE[0] * SHAPE[1]).reshape(SHAPE) // SHAPE[1] == 8, 18.0, 6.0)
 def test_squares_cover_the_candidates_and_are_as_wide_as_vehicles_are_large(mask, height, slope):
     heights = height + slope * np.arange(SHAPE[0])
-    rows, columns, numbers = fg.blocks(mask, heights)
+    rows, columns, numbers = fg.blocks(mask, fg.widths(heights))
     assert ((numbers >= 0) == mask).all()
     assert len(rows) == len(columns) == len(np.unique(numbers[mask]))
+    begins, widths = np.zeros(SHAPE[0], int), np.zeros(SHAPE[0], int)
+    y = 0
+    while y < SHAPE[0]:
+        width = max(int(heights[y] // fg.BLOCK), 1)
+        begins[y : y + width], widths[y : y + width] = y, width
+        y += width
     for k in range(len(rows)):
         ys, xs = np.nonzero(numbers == k)
-        # Each lies about its middle, and begins where one of its width does.
-        width = max(int(heights[: ys.min() + 1].max() // fg.BLOCK), 1)
-        assert np.ptp(ys) < width
-        assert np.ptp(xs) < width
+        # Each lies about its middle, in one band of rows, and begins where one of its width does.
+        assert len(set(begins[ys])) == 1
+        width = widths[ys[0]]
         assert len({int(x) // width for x in xs}) == 1
         assert abs(rows[k] - ys).max() <= width
         assert abs(columns[k] - xs).max() <= width
