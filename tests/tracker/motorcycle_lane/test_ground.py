@@ -71,3 +71,22 @@ def test_light_that_changes_at_once_is_followed_at_once():
     part[:15] = 140
     assert relit(road, lit)
     assert not relit(road, part)
+
+
+def test_it_follows_fast_at_first_and_never_beside_a_vehicle():
+    road = np.full((40, 60, 3), 100, np.uint8)
+    light = np.full((40, 60, 3), 140, np.uint8)
+    nobody = np.zeros((40, 60), bool)
+    rider = nobody.copy()
+    rider[20, 30] = True
+    ground = Ground()
+    ground.image(light)
+    ways = []
+    for _ in range(40):
+        before = ground.image(light).astype(int)
+        ground.learn(road, ~nobody, rider)
+        ways.append((before - ground.image(light))[0, 0, 0])
+    assert sum(ways[:10]) > 20 > 10 > sum(ways[30:])
+    shown = ground.image(light)
+    assert (shown[18:23, 28:33] == 140).all()
+    assert (shown[20, [27, 33]] < 140).all()

@@ -93,13 +93,21 @@ def test_pixels_that_surely_are_a_vehicles_are_asked_for_sizes():
     squares = seen.squares
     sure = np.flatnonzero((seen.odds > SURE) & body[squares.rows, squares.columns])
     assert GUESSES // 2 < len(told.rows) <= GUESSES < len(sure) < (seen.odds > SURE).sum()
-    wanted = {}
-    for square in sure:
-        row = seen.squares.rows[square]
+    asked = sure[:: int(np.ceil(len(sure) / GUESSES))]
+    assert told.rows.tolist() == squares.rows[asked].tolist()
+    for square, size in zip(asked, told.sizes, strict=True):
         logs = [log_odds(seen.cues[square : square + 1], weighed_by)[0] for weighed_by in size_trees]
-        wanted.setdefault(row, []).append(heights[row] * np.exp(logs))
-    for row, size in zip(told.rows, told.sizes, strict=True):
-        assert any(np.allclose(size, one) for one in wanted[row])
+        np.testing.assert_allclose(size, heights[squares.rows[square]] * np.exp(logs))
+
+
+@pytest.mark.parametrize("travelled", [False, True])
+def test_what_was_seen_long_ago_is_forgotten(travelled):
+    model = SizeModel(240)
+    rows = np.linspace(40.0, 200.0, 3000)
+    for times in (1.0, 2.0):
+        model.learn(Samples(rows, times * np.stack([0.2 * rows, 0.4 * rows], 1)), travelled=travelled)
+        there = model.sizes(np.array([120.0]))
+        np.testing.assert_allclose(there, [[24.0 * times, 48.0 * times]], rtol=0.1)
 
 
 @pytest.mark.parametrize("wrong", [0.7, 1.4])
