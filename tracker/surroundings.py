@@ -77,20 +77,24 @@ def integrals(maps):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def reaches(mask):  # type: ignore[no-untyped-def]
-    """Return (H, W, 4) int16, how far foreground reaches from a pixel, with it: up, down, left and right."""
+def reaches(mask, rows, columns):  # type: ignore[no-untyped-def]
+    """Return (N, 4) int64, how far foreground reaches from pixels, with them: up, down, left and right."""
     height, width = mask.shape
-    found = np.zeros((height, width, 4), np.int16)
-    for y in range(height):
-        for x in range(width):
-            if mask[y, x]:
-                found[y, x, 0] = 1 + (found[y - 1, x, 0] if y else 0)
-                found[y, x, 2] = 1 + (found[y, x - 1, 2] if x else 0)
-    for y in range(height - 1, -1, -1):
-        for x in range(width - 1, -1, -1):
-            if mask[y, x]:
-                found[y, x, 1] = 1 + (found[y + 1, x, 1] if y + 1 < height else 0)
-                found[y, x, 3] = 1 + (found[y, x + 1, 3] if x + 1 < width else 0)
+    found = np.zeros((rows.size, 4), np.int64)
+    for n in range(rows.size):
+        y, x = rows[n], columns[n]
+        if not mask[y, x]:
+            continue
+        up, down, left, right = y, y, x, x
+        while up >= 0 and mask[up, x]:
+            up -= 1
+        while down < height and mask[down, x]:
+            down += 1
+        while left >= 0 and mask[y, left]:
+            left -= 1
+        while right < width and mask[y, right]:
+            right += 1
+        found[n] = y - up, down - y, x - left, right - x
     return found
 
 

@@ -85,7 +85,7 @@ def _gather(now, then, sums, changes, reached, spread, often, rows, columns, off
         found[n, 8] = max(abs(r - s), abs(g - h), abs(b - c))
         found[n, 9], found[n, 10] = spread[y, x], often[y, x]
         for k in range(4):
-            found[n, 11 + k] = reached[y, x, k]
+            found[n, 11 + k] = reached[n, k]
         at = OWN
         for k in range(areas.size):
             for kind in range(2):
@@ -115,8 +115,9 @@ def cues(
     np.multiply(raw, UNIT, out=changes[0])
     np.multiply(background.often, UNIT, out=changes[1], casting="unsafe")
     sums = integrals(differences(now, then)), integrals(changes)
+    reached, often = reaches(raw, rows, columns), background.often
     found: NDArray[np.float32] = _gather(
-        now, then, *sums, reaches(raw), background.spread, background.often, rows, columns, OFFSETS, AREAS
+        now, then, *sums, reached, background.spread, often, rows, columns, OFFSETS, AREAS
     )
     return found
 

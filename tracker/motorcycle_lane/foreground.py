@@ -86,7 +86,7 @@ def _gather(now, then, sums, reached, heights, rows, columns, offsets):  # type:
         found[n, 3] = (most - min(r, g, b)) / (most + DIM)
         found[n, 4] = r + g + b
         for k in range(4):
-            found[n, 5 + k] = reached[y, x, k] / tall
+            found[n, 5 + k] = reached[n, k] / tall
         for k in range(offsets.shape[0]):
             left, right = bounds(x + across[k], half, width)
             top, bottom = bounds(y + down[k], half, height)
@@ -118,7 +118,8 @@ def cues(
     """
     now, then = (np.stack(cv2.split(cv2.blur(picture, (3, 3)))) for picture in (image, background))
     sums = integrals(differences(now, then))
-    found: NDArray[np.float32] = _gather(now, then, sums, reaches(raw), heights, rows, columns, OFFSETS)
+    reached = reaches(raw, rows, columns)
+    found: NDArray[np.float32] = _gather(now, then, sums, reached, heights, rows, columns, OFFSETS)
     return found
 
 

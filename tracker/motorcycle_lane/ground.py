@@ -27,8 +27,8 @@ FASTEST = 0.5
 """... this share of the difference, where the pixel is not changed."""
 MARGIN = 5
 """Width of the square around each pixel in which no vehicle may be, px."""
-RELIT = 4.0
-"""Median of the grey levels by which the background model's image changes at once if the light does."""
+RELIT = 4
+"""Grey levels by more than which most of the background model's image changes at once if the light does."""
 
 
 @njit(cache=True)
@@ -93,4 +93,4 @@ class Ground:
 def relit(before: Image, now: Image) -> bool:
     """Tell whether most of a background image (H, W, 3) has changed at once."""
     coarse = np.abs(now[::4, ::4].astype(np.int16) - before[::4, ::4])
-    return bool(np.median(coarse) > RELIT)
+    return np.count_nonzero(coarse > RELIT) > coarse.size // 2
