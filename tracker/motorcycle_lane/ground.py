@@ -93,4 +93,4 @@ class Ground:
 def relit(before: Image, now: Image) -> bool:
     """Tell whether most of a background image (H, W, 3) has changed at once."""
     coarse = np.abs(now[::4, ::4].astype(np.int16) - before[::4, ::4])
-    return np.count_nonzero(coarse > RELIT) > coarse.size // 2
+    return bool(np.count_nonzero(coarse > RELIT) > coarse.size // 2)
