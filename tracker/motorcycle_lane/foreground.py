@@ -7,8 +7,8 @@ surroundings are looked at where they are on a vehicle of any size (as in Shotto
 recognition in parts from single depth images, CVPR 2011). That gives back, too, what the background model
 missed within a vehicle.
 
-The trees (foreground.npz) were learnt from simulated lanes by ``python -m tests.training.foreground``: of
-motorcycles, cars and heavier vehicles, before cameras, lights and roads of many kinds.
+The trees (foreground.npz) were learnt from simulated lanes by ``python -m tests.training.lane_foreground``:
+of motorcycles, cars and heavier vehicles, before cameras, lights and roads of many kinds.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Learns the trees of the lane's tracker from simulated lanes: those of `.foreground` and of `.sizes`.
 
-``python -m tests.training.foreground`` simulates every lane scenario over seeds that no validation uses, lets
-the background model look, compares each pixel near its foreground with the truth, and writes the trees. The
-background model knows nothing of the trees, and the ground is told the true vehicles, so that one round is
-enough; as the trees will not find all of these, half of the lanes show the background model's image in its
+``python -m tests.training.lane_foreground`` simulates every lane scenario over seeds that no validation uses,
+lets the background model look, compares each pixel near its foreground with the truth, and writes the trees.
+The background model knows nothing of the trees, and the ground is told the true vehicles, so that one round
+is enough; as the trees will not find all of these, half of the lanes show the background model's image in its
 place. What is learnt from is kept in a folder (1.2 GB); a lane that is there already is not simulated again.
 It needs ``pip install 'testtrack[training]'``.
 """
