@@ -134,6 +134,11 @@ class Blocks(NamedTuple):
     columns: NDArray[np.int64]
     numbers: NDArray[np.int32]
 
+    def pixels(self, chosen: Mask) -> Mask:
+        """Return (H, W) the pixels of chosen squares (N,)."""
+        # The last entry is that of pixels in no square.
+        return np.append(chosen, False)[self.numbers]
+
 
 @njit(cache=True)
 def _blocks(mask, widths):  # type: ignore[no-untyped-def]

@@ -134,7 +134,6 @@ def vehicles(background: Background, raw: Mask) -> Mask:
         background: With the last picture laid on it.
         raw: (H, W) its changes.
     """
-    rows, columns, numbers = squares(raw)
-    odds = log_odds(cues(background, raw, rows, columns), learnt(__package__, "foreground"), settled=SETTLED)
-    # The last entry is that of pixels in no square.
-    return np.append(odds > 0.0, False)[numbers]
+    near = squares(raw)
+    found = cues(background, raw, near.rows, near.columns)
+    return near.pixels(log_odds(found, learnt(__package__, "foreground"), settled=SETTLED) > 0.0)

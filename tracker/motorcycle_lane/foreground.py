@@ -144,8 +144,7 @@ class Weighed(NamedTuple):
     @property
     def vehicles(self) -> Mask:
         """(H, W) what is a vehicle."""
-        # The last entry is that of pixels in no square.
-        return np.append(self.odds > 0.0, False)[self.squares.numbers]
+        return self.squares.pixels(self.odds > 0.0)
 
 
 def weigh(image: Image, background: Image, raw: Mask, heights: Floats, trees: Trees) -> Weighed:
