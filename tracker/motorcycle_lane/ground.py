@@ -29,6 +29,11 @@ MARGIN = 5
 """Width of the square around each pixel in which no vehicle may be, px."""
 RELIT = 4
 """Grey levels by more than which most of the background model's image changes at once if the light does."""
+UNSURE = 60
+"""Frames after that in which vehicles hold the ground only where they move: shadows lie elsewhere now, and
+where they did or do is taken for vehicles."""
+MOVED, CALM = 10, 8
+"""Grey levels by which a pixel moves from frame to frame; frames without from which on it stands still."""
 
 
 @njit(cache=True)
@@ -66,12 +71,17 @@ class Ground:
         self._exact: Floats = np.zeros((0, 0, 3), np.float32)
         self._image: Image = np.zeros((0, 0, 3), np.uint8)
         self._background: Image = self._image
-        self._frames = 0
+        self._frames = self._unsure = 0
+        self._previous: Image = self._image
+        self._still: Image = np.zeros((0, 0), np.uint8)
 
     def image(self, background: Image) -> Image:
         """Return (H, W, 3) the ground; the background model's image (H, W, 3) tells of sudden light."""
-        if self._frames == 0 or relit(self._background, background):
+        again = self._frames > 0 and relit(self._background, background)
+        if self._frames == 0 or again:
             self._exact, self._image = background.astype(np.float32), background
+        if again:
+            self._unsure, self._still = UNSURE, np.zeros(background.shape[:2], np.uint8)
         self._background = background
         return self._image
 
@@ -85,6 +95,12 @@ class Ground:
         """
         haste = max(1.0, START / (self._frames + 1))
         held = cv2.dilate(vehicles.view(np.uint8), np.ones((MARGIN, MARGIN), np.uint8))
+        if self._unsure:
+            self._unsure -= 1
+            moved = cv2.absdiff(image, self._previous).max(2) > MOVED
+            self._still = np.where(moved, 0, np.minimum(self._still + 1, CALM)).astype(np.uint8)
+            held *= self._still < CALM
+        self._previous = image
         steps = (RISE * haste, FALL * haste, min(RATE * haste, FASTEST))
         self._image = lead(self._exact, image, held, raw, *map(np.float32, steps))
         self._frames += 1

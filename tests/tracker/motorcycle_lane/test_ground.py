@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tracker.motorcycle_lane.ground import Ground, lead, relit
+from tracker.motorcycle_lane.ground import UNSURE, Ground, lead, relit
 
 SHAPE = (5, 7)
 PICTURES = arrays(np.uint8, (*SHAPE, 3))
@@ -90,3 +90,28 @@ def test_it_follows_fast_at_first_and_never_beside_a_vehicle():
     shown = ground.image(light)
     assert (shown[18:23, 28:33] == 140).all()
     assert (shown[20, [27, 33]] < 140).all()
+
+
+def test_for_a_while_after_the_light_has_changed_what_stands_still_is_ground():
+    road, none = np.full((40, 60, 3), 90, np.uint8), np.zeros((40, 60), bool)
+    shade, rider = none.copy(), none.copy()
+    shade[25:35, 5:25], rider[5:15, 30:40] = True, True
+
+    def lasting(light: int, frames: int) -> np.ndarray:
+        """Return the ground where shade, and a rider of many colours, are taken for vehicles for a while."""
+        ground = Ground()
+        ground.image(road)
+        ground.learn(road, none, none)
+        for frame in range(frames):
+            image = road + np.uint8(light)
+            image[shade] -= np.uint8(30)
+            image[rider] = 40 + 40 * (frame % 3)
+            ground.image(road + np.uint8(light))
+            ground.learn(image, shade | rider, shade | rider)
+        return ground.image(road + np.uint8(light)).astype(int)
+
+    for frames, seen in ((UNSURE, 120), (10, 137)):
+        relit_ground = lasting(50, frames)
+        assert (np.abs(relit_ground[shade] - seen) < 10).all()
+        assert (relit_ground[rider] == 140).all()
+    assert (lasting(0, UNSURE)[shade] == 90).all()
