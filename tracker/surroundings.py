@@ -21,13 +21,21 @@ UNIT = 256
 """Whole numbers that make 1 where averages are taken."""
 
 
+def smoothed(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return (3, H, W) the channels of a picture (H, W, 3), averaged over 3 x 3 pixels."""
+    found = np.empty((3, *picture.shape[:2]), np.uint8)
+    for channel, plane in zip(cv2.split(picture), found, strict=True):
+        cv2.blur(channel, (3, 3), dst=plane)
+    return found
+
+
 @njit(cache=True, error_model="numpy")
 def differences(now, then):  # type: ignore[no-untyped-def]
     """Compare a picture with the background.
 
     Args:
-        now: (3, H, W) uint8, the channels of the picture, averaged over 3 x 3 pixels.
-        then: (3, H, W) uint8, those of the background image, likewise.
+        now: (3, H, W) uint8, the picture, `smoothed`.
+        then: (3, H, W) uint8, the background image, likewise.
 
     Returns:
         (2, H, W) int32, in parts of `UNIT`: how many times as bright it is, the mean of the channels; and how

@@ -12,7 +12,6 @@ tests.training.aerial_foreground``, over roads of all kinds, from many heights, 
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -29,6 +28,7 @@ from tracker.surroundings import (
     differences,
     integrals,
     reaches,
+    smoothed,
 )
 
 Mask = NDArray[np.bool_]
@@ -109,8 +109,7 @@ def cues(
         rows: (N,) of the pixels.
         columns: (N,) of them.
     """
-    pictures = background.laid, background.ground
-    now, then = (np.stack(cv2.split(cv2.blur(picture, (3, 3)))) for picture in pictures)
+    now, then = smoothed(background.laid), smoothed(background.ground)
     changes = np.empty((2, *raw.shape), np.int32)
     np.multiply(raw, UNIT, out=changes[0])
     np.multiply(background.often, UNIT, out=changes[1], casting="unsafe")

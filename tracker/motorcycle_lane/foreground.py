@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -31,6 +30,7 @@ from tracker.surroundings import (
     differences,
     integrals,
     reaches,
+    smoothed,
 )
 
 Floats = NDArray[np.float64]
@@ -116,7 +116,7 @@ def cues(
         rows: (N,) of the pixels.
         columns: (N,) of them.
     """
-    now, then = (np.stack(cv2.split(cv2.blur(picture, (3, 3)))) for picture in (image, background))
+    now, then = smoothed(image), smoothed(background)
     sums = integrals(differences(now, then))
     reached = reaches(raw, rows, columns)
     found: NDArray[np.float32] = _gather(now, then, sums, reached, heights, rows, columns, OFFSETS)
