@@ -115,3 +115,18 @@ def test_for_a_while_after_the_light_has_changed_what_stands_still_is_ground():
         assert (np.abs(relit_ground[shade] - seen) < 10).all()
         assert (relit_ground[rider] == 140).all()
     assert (lasting(0, UNSURE)[shade] == 90).all()
+
+
+def test_later_who_stands_still_is_no_ground():
+    road, nobody = np.full((40, 60, 3), 90, np.uint8), np.zeros((40, 60), bool)
+    parked = nobody.copy()
+    parked[10:20, 10:20] = True
+    ground = Ground()
+    for frame in range(UNSURE + 80):
+        lit = road if frame == 0 else road + np.uint8(50)
+        there = parked if frame > UNSURE + 5 else nobody
+        image = lit.copy()
+        image[there] = 30
+        ground.image(lit)
+        ground.learn(image, there, there)
+    assert (ground.image(lit) == 140).all()
