@@ -111,7 +111,7 @@ def draw(rows: Sequence[dict[str, Any]], directory: Path) -> None:
         axes.set(xlabel="riders in view, mean", title=label, ylim=(0, 1.02), xlim=(0, None))
         axes.grid(color="#d9dde4", linewidth=0.5)
         axes.spines[["top", "right"]].set_visible(False)
-    panels[0].legend(frameon=False, loc="upper right", fontsize=8.5)
+    panels[0].legend(frameon=False, loc="center right", fontsize=8.5)
     for suffix in ("svg", "png"):
         figure.savefig(directory / f"riders_in_view.{suffix}", dpi=160)
 
