@@ -100,7 +100,7 @@ class Ground:
             moved = cv2.absdiff(image, self._previous).max(2) > MOVED
             self._still = np.where(moved, 0, np.minimum(self._still + 1, CALM)).astype(np.uint8)
             held *= self._still < CALM
-        self._previous = image
+        self._previous = image.copy()
         steps = (RISE * haste, FALL * haste, min(RATE * haste, FASTEST))
         self._image = lead(self._exact, image, held, raw, *map(np.float32, steps))
         self._frames += 1
