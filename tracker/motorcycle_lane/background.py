@@ -22,6 +22,7 @@ from tracker.motorcycle_lane.tables import (
     COLOUR,
     GRADIENT,
     PAIR,
+    Entries,
     Table,
     all_same,
     approach,
@@ -185,7 +186,10 @@ class BackgroundModel:
         i = row * self._shape[1] + column
         shared = self._factor_shared[i] if self._conditional else self._factor
         factors = np.array([self._factor, shared], np.float64)
-        both = (np.stack([table.seen[:, i], table.shared[:, i]], 1) for table in self._tables)
+        both = (
+            np.stack([np.append(usual[i], rest[i]) for usual, rest in zip(*table, strict=True)][1:], 1)
+            for table in self._tables
+        )
         return tuple(factors * values[values[:, 0] > 0] for values in both)
 
     def apply(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -262,6 +266,11 @@ class BackgroundModel:
         floors = p.colour_floor, p.gradient_floor, 0.0
         yield from zip((COLOUR, GRADIENT, PAIR), self._tables, features, tolerances, floors, strict=True)
 
+    def _entries(self) -> Iterator[Entries]:
+        """Yield the usual entries and the rest of each table."""
+        for table in self._tables:
+            yield from table
+
     def _with_rims(self, foreground: NDArray[np.bool_], changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return (P,) foreground and what is changed beside more than specks of it."""
         picture = foreground.reshape(self._shape).view(np.uint8)
@@ -300,7 +309,7 @@ class BackgroundModel:
         """
         p = self.parameters
         # All p(v) sum to 1 at most, and most pixels have seen too much background by one colour alone.
-        least = self._p_b[at] * self._tables[0].shared[0, at] * self._shared_factors(at)
+        least = self._p_b[at] * self._tables[0].usual.shared[at] * self._shared_factors(at)
         at = at[least < 1.0 + ROUNDING - p.once_off]
         seen, shared = totals(self._tables[0], at, p.colours[0])
         foreign = seen * self._factor - self._p_b[at] * shared * self._shared_factors(at)
@@ -318,11 +327,9 @@ class BackgroundModel:
             at: Pixels that are foreground.
         """
         p = self.parameters
-        usual = all_same(
-            COLOUR, self._tables[0].features[0, at], features[0][at], p.tolerance, p.colour_floor
-        )
-        at = at[usual]
-        self._p_b[at] = np.maximum(self._p_b[at], self._tables[0].seen[0, at] * self._factor)
+        usual = self._tables[0].usual
+        at = at[all_same(COLOUR, usual.features[at], features[0][at], p.tolerance, p.colour_floor)]
+        self._p_b[at] = np.maximum(self._p_b[at], usual.seen[at] * self._factor)
         whole = np.ones(len(at), np.float32) if self._conditional else self._p_b[at]
         whole /= self._shared_factors(at)
         for kind, table, feature, tolerance, floor in self._kinds(features):
@@ -337,9 +344,9 @@ class BackgroundModel:
         """Take a frame for background, the only thing that each pixel has ever shown."""
         features = extract(image)
         for table, feature in zip(self._tables, features, strict=True):
-            table.seen[: table.used] = 0.0
-            table.features[0] = feature
-            table.seen[0] = table.shared[0] = 1.0
+            table.rest.seen[:] = 0.0
+            table.usual.features[:] = feature
+            table.usual.seen[:] = table.usual.shared[:] = 1.0
         self._background[:], self._picture = image.reshape(-1, 3).T, None
         self._previous = features[0]
         self._p_b[:] = 1.0
@@ -365,8 +372,8 @@ class BackgroundModel:
 
     def _begin_background(self) -> None:
         """Forget what went for background so far: only now is it known what each pixel shows most often."""
-        for table in self._tables:
-            table.shared[: table.used] = 0.0
+        for entries in self._entries():
+            entries.shared[:] = 0.0
         self._p_b[:] = 0.0
         self._earlier = np.float32(1.0)
 
@@ -375,26 +382,25 @@ class BackgroundModel:
         share = np.float32(1.0) - self._earlier
         self._p_b /= share
         if self.parameters.mode is StatMode.JOINT:
-            for table in self._tables:
-                table.shared[: table.used] /= share
+            for entries in self._entries():
+                entries.shared[:] /= share
             return
         self._conditional = True
         self._factor_shared[:] = 1.0
         scale = self._factor / (share * np.maximum(self._p_b, np.float32(1e-6)))
-        for table in self._tables:
-            table.shared[: table.used] *= scale
+        for entries in self._entries():
+            entries.shared.T[:] *= scale
 
     def _take_in(self) -> None:
         """Take common factors that have become small into the tables, and begin them again."""
         if self._factor < FADED:
-            for table in self._tables:
-                used = table.used
-                table.seen[:used] *= self._factor
+            for entries in self._entries():
+                entries.seen[:] *= self._factor
                 if not self._conditional:
-                    table.shared[:used] *= self._factor
+                    entries.shared[:] *= self._factor
             self._factor = np.float32(1.0)
         if self._conditional and self._factor_shared.min() < FADED:
             faded = np.flatnonzero(self._factor_shared < FADED)
-            for table in self._tables:
-                table.shared[: table.used, faded] *= self._factor_shared[faded]
+            for entries in self._entries():
+                entries.shared.T[..., faded] *= self._factor_shared[faded]
             self._factor_shared[faded] = 1.0

@@ -4,8 +4,9 @@ A table holds for each pixel the features seen most often, how often: p(v), and 
 p(v|b), sorted by p(v), of equals the latest first. Every frame all entries fade by (1 - rate) and the one
 seen grows by the rate. Fading all of them would touch the whole memory in each frame, so a common factor is
 kept aside instead: an entry holds its value divided by that factor, grows by rate / factor, and all others
-stay as they are. Values are the same up to rounding, and so is the order. The layout is plane by plane,
-entry 0 of all pixels first: most pixels need no other.
+stay as they are. Values are the same up to rounding, and so is the order. Most pixels need their first entry
+alone, so that those of all pixels lie side by side; the others lie pixel by pixel, as they are asked one after
+another.
 
 Features are packed into 32 bits: three bytes of colour; two signed bytes of gradient; six times five bits of
 colour before and now.
@@ -28,13 +29,13 @@ LATEST = np.float32(1.0001)
 LANES, ONES, REST, TOPS = (np.uint32(bits * 0x100401) for bits in (0x1F, 0x1, 0xFF, 0x100))
 
 
-class Table(NamedTuple):
-    """Statistics of one kind of feature, M entries for each of P pixels.
+class Entries(NamedTuple):
+    """Entries of a table, (P,) or (P, K): one or K of each pixel.
 
     Attributes:
-        features: (M, P) uint32.
-        seen: (M, P) float32, p(v) without the common factor; 0 is an empty entry.
-        shared: (M, P) float32, p(v|b) without its factor.
+        features: uint32.
+        seen: float32, p(v) without the common factor; 0 is an empty entry.
+        shared: float32, p(v|b) without its factor.
     """
 
     features: NDArray[np.uint32]
@@ -42,15 +43,26 @@ class Table(NamedTuple):
     shared: NDArray[np.float32]
 
     @classmethod
-    def empty(cls, entries: int, pixels: int) -> Table:
-        """Return a table without entries; memory is used as entries come."""
-        shape = entries, pixels
+    def empty(cls, *shape: int) -> Entries:
+        """Return entries that are empty; memory is used as they are filled."""
         return cls(np.zeros(shape, np.uint32), np.zeros(shape, np.float32), np.zeros(shape, np.float32))
 
-    @property
-    def used(self) -> int:
-        """How many entries the fullest pixel has; the memory beyond has not been touched."""
-        return next((k for k, entry in enumerate(self.seen) if not entry.any()), len(self.seen))
+
+class Table(NamedTuple):
+    """Statistics of one kind of feature, M entries for each of P pixels.
+
+    Attributes:
+        usual: (P,) the most frequent ones.
+        rest: (P, M - 1) the others.
+    """
+
+    usual: Entries
+    rest: Entries
+
+    @classmethod
+    def empty(cls, entries: int, pixels: int) -> Table:
+        """Return a table without entries."""
+        return cls(Entries.empty(pixels), Entries.empty(pixels, entries - 1))
 
 
 @njit(cache=True)
@@ -139,30 +151,31 @@ def evidence(kind, table, features, at, first, tolerance, floor):  # type: ignor
     Returns:
         Two (K,) float32, both without their common factors.
     """
-    entries, frequency, shared_frequency = table.features, table.seen, table.shared
+    usual, rest = table.usual, table.rest
     seen, shared = np.zeros(at.size, np.float32), np.zeros(at.size, np.float32)
     for a in range(at.size):
         i = at[a]
-        for k in range(first):
-            if frequency[k, i] == 0.0:
+        if same(kind, usual.features[i], features[i], tolerance, floor):
+            seen[a], shared[a] = usual.seen[i], usual.shared[i]
+        for k in range(first - 1):
+            if rest.seen[i, k] == 0.0:
                 break
-            if same(kind, entries[k, i], features[i], tolerance, floor):
-                seen[a] += frequency[k, i]
-                shared[a] += shared_frequency[k, i]
+            if same(kind, rest.features[i, k], features[i], tolerance, floor):
+                seen[a] += rest.seen[i, k]
+                shared[a] += rest.shared[i, k]
     return seen, shared
 
 
 @njit(cache=True)
 def totals(table, at, first):  # type: ignore[no-untyped-def]
     """Sum p(v) and p(v|b) over all of the first N entries of pixels ``at``; two (K,) as in `evidence`."""
-    frequency, shared_frequency = table.seen, table.shared
-    seen, shared = np.zeros(at.size, np.float32), np.zeros(at.size, np.float32)
+    seen, shared = table.usual.seen[at], table.usual.shared[at]
     for a in range(at.size):
-        for k in range(first):
-            if frequency[k, at[a]] == 0.0:
+        for k in range(first - 1):
+            if table.rest.seen[at[a], k] == 0.0:
                 break
-            seen[a] += frequency[k, at[a]]
-            shared[a] += shared_frequency[k, at[a]]
+            seen[a] += table.rest.seen[at[a], k]
+            shared[a] += table.rest.shared[at[a], k]
     return seen, shared
 
 
@@ -195,6 +208,12 @@ def fade(factors, is_background, rate):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _put(entries, at, feature, seen, shared):  # type: ignore[no-untyped-def]
+    """Write an entry."""
+    entries.features[at], entries.seen[at], entries.shared[at] = feature, seen, shared
+
+
+@njit(cache=True)
 def learn(kind, table, features, grow, grow_shared, tolerance, floor):  # type: ignore[no-untyped-def]
     """Count one feature of each pixel: eqs. (10), (11), after the common factors have faded.
 
@@ -211,34 +230,45 @@ def learn(kind, table, features, grow, grow_shared, tolerance, floor):  # type: 
         tolerance: As in `same`.
         floor: As in `same`.
     """
-    entries, frequency, shared_frequency = table.features, table.seen, table.shared
-    last, nothing = entries.shape[0] - 1, np.float32(0.0)
+    usual, rest = table.usual, table.rest
+    last, nothing = rest.seen.shape[1] - 1, np.float32(0.0)
     # Nearly all pixels show their first entry: that is told, and counted, without a branch.
-    usual = all_same(kind, entries[0], features, tolerance, floor)
+    shown = all_same(kind, usual.features, features, tolerance, floor)
     for i in range(features.size):
-        frequency[0, i] += grow if usual[i] else nothing
-        shared_frequency[0, i] += grow_shared[i] if usual[i] else nothing
+        usual.seen[i] += grow if shown[i] else nothing
+        usual.shared[i] += grow_shared[i] if shown[i] else nothing
     for i in range(features.size):
-        if usual[i]:
+        if shown[i]:
             continue
         feature = features[i]
-        k, known = 1, False
-        while frequency[k, i] > 0.0:
-            known = same(kind, entries[k, i], feature, tolerance, floor)
+        k, known = 0, False
+        while rest.seen[i, k] > 0.0:
+            known = same(kind, rest.features[i, k], feature, tolerance, floor)
             if known or k == last:
                 break
             k += 1
         seen, shared = grow, grow_shared[i]
         if known:
-            feature = entries[k, i]
-            seen += frequency[k, i]
-            shared += shared_frequency[k, i]
-        while k > 0 and frequency[k - 1, i] <= seen * LATEST:
-            entries[k, i] = entries[k - 1, i]
-            frequency[k, i] = frequency[k - 1, i]
-            shared_frequency[k, i] = shared_frequency[k - 1, i]
+            feature = rest.features[i, k]
+            seen += rest.seen[i, k]
+            shared += rest.shared[i, k]
+        while k > 0 and rest.seen[i, k - 1] <= seen * LATEST:
+            _put(rest, (i, k), rest.features[i, k - 1], rest.seen[i, k - 1], rest.shared[i, k - 1])
             k -= 1
-        entries[k, i], frequency[k, i], shared_frequency[k, i] = feature, seen, shared
+        if k == 0 and usual.seen[i] <= seen * LATEST:
+            _put(rest, (i, 0), usual.features[i], usual.seen[i], usual.shared[i])
+            _put(usual, i, feature, seen, shared)
+        else:
+            _put(rest, (i, k), feature, seen, shared)
+
+
+@njit(cache=True)
+def _turned(seen, shared, p_b, factor, factor_shared):  # type: ignore[no-untyped-def]
+    """Return what p(v|b) of one entry becomes in `turn`, without its factor."""
+    whole, whole_shared = seen * factor, shared * factor_shared
+    if 2.0 * whole_shared * p_b > whole:
+        return shared
+    return (whole - p_b * whole_shared) / ((np.float32(1.0) - p_b) * factor_shared)
 
 
 @njit(cache=True)
@@ -256,15 +286,14 @@ def turn(table, at, first, p_b, factor, factors_shared):  # type: ignore[no-unty
         factor: Common factor of p(v).
         factors_shared: (K,) common factor of p(v|b).
     """
-    frequency, shared_frequency = table.seen, table.shared
+    usual, rest = table.usual, table.rest
     for a in range(at.size):
-        i, others = at[a], np.float32(1.0) - p_b[a]
-        for k in range(first):
-            if frequency[k, i] == 0.0:
+        i = at[a]
+        usual.shared[i] = _turned(usual.seen[i], usual.shared[i], p_b[a], factor, factors_shared[a])
+        for k in range(first - 1):
+            if rest.seen[i, k] == 0.0:
                 break
-            seen, shared = frequency[k, i] * factor, shared_frequency[k, i] * factors_shared[a]
-            if 2.0 * shared * p_b[a] <= seen:
-                shared_frequency[k, i] = (seen - p_b[a] * shared) / (others * factors_shared[a])
+            rest.shared[i, k] = _turned(rest.seen[i, k], rest.shared[i, k], p_b[a], factor, factors_shared[a])
 
 
 @njit(cache=True)
@@ -280,12 +309,15 @@ def found_anew(kind, table, features, at, whole, tolerance, floor):  # type: ign
         tolerance: As in `same`.
         floor: As in `same`.
     """
-    entries, frequency, shared_frequency = table.features, table.seen, table.shared
+    usual, rest = table.usual, table.rest
     for a in range(at.size):
         i = at[a]
-        for k in range(entries.shape[0]):
-            if frequency[k, i] == 0.0:
+        if same(kind, usual.features[i], features[i], tolerance, floor):
+            usual.shared[i] = whole[a]
+            continue
+        for k in range(rest.seen.shape[1]):
+            if rest.seen[i, k] == 0.0:
                 break
-            if same(kind, entries[k, i], features[i], tolerance, floor):
-                shared_frequency[k, i] = whole[a]
+            if same(kind, rest.features[i, k], features[i], tolerance, floor):
+                rest.shared[i, k] = whole[a]
                 break
