@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -87,5 +88,5 @@ def _lay_out(node: dict[str, Any], nodes: list[list[float]]) -> None:
 def write(trees: Trees, file: Path) -> None:
     """Write trees where `tracker.boosting.learnt` finds them."""
     with moved_in(file) as path, path.open("wb") as stream:
-        np.savez_compressed(stream, **trees._asdict())
+        np.savez_compressed(stream, **asdict(trees))
     print(f"Written: {file}")
