@@ -24,8 +24,7 @@ UNIT = 256
 def smoothed(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return (3, H, W) the channels of a picture (H, W, 3), averaged over 3 x 3 pixels."""
     found = np.empty((3, *picture.shape[:2]), np.uint8)
-    for channel, plane in zip(cv2.split(picture), found, strict=True):
-        cv2.blur(channel, (3, 3), dst=plane)
+    cv2.split(cv2.blur(picture, (3, 3)), list(found))
     return found
 
 
@@ -144,8 +143,17 @@ class Blocks(NamedTuple):
 
     def pixels(self, chosen: Mask) -> Mask:
         """Return (H, W) the pixels of chosen squares (N,)."""
-        # The last entry is that of pixels in no square.
-        return np.append(chosen, False)[self.numbers]
+        found: Mask = _pixels(self.numbers, chosen)
+        return found
+
+
+@njit(cache=True)
+def _pixels(numbers, chosen):  # type: ignore[no-untyped-def]
+    found = np.empty(numbers.shape, np.bool_)
+    for y in range(numbers.shape[0]):
+        for x in range(numbers.shape[1]):
+            found[y, x] = numbers[y, x] >= 0 and chosen[numbers[y, x]]
+    return found
 
 
 @njit(cache=True)

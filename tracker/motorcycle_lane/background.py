@@ -172,8 +172,8 @@ class BackgroundModel:
     def background(self) -> NDArray[np.uint8]:
         """The background image, (H, W, 3) RGB."""
         if self._picture is None:
-            channels = self._background.round().astype(np.uint8).reshape(3, *self._shape)
-            self._picture = np.asarray(cv2.merge(tuple(channels)))
+            channels = [cv2.convertScaleAbs(channel) for channel in self._background.reshape(3, *self._shape)]
+            self._picture = np.asarray(cv2.merge(channels))
         return self._picture
 
     @property

@@ -36,31 +36,47 @@ MOVED, CALM = 10, 8
 """Grey levels by which a pixel moves from frame to frame; frames without from which on it stands still."""
 
 
-@njit(cache=True)
-def lead(ground, image, held, changed, rise, fall, rate):  # type: ignore[no-untyped-def]
+def lead(
+    ground: Floats,
+    image: Image,
+    held: NDArray[np.uint8],
+    changed: Mask,
+    rise: np.float32,
+    fall: np.float32,
+    rate: np.float32,
+) -> Image:
     """Let the ground, in place, follow a picture.
 
     Args:
-        ground: (H, W, 3) float32.
-        image: (H, W, 3) uint8.
-        held: (H, W) uint8, not 0 where it stays as it is.
-        changed: (H, W) bool, where it goes up by ``rise`` and down by ``fall`` at most; elsewhere by a share
+        ground: (H, W, 3).
+        image: (H, W, 3).
+        held: (H, W), not 0 where it stays as it is.
+        changed: (H, W), where it goes up by ``rise`` and down by ``fall`` at most; elsewhere by a share
             ``rate`` of the difference.
-        rise: float32, as are the others.
+        rise: See above.
         fall: See above.
         rate: See above.
 
     Returns:
-        (H, W, 3) uint8, the ground in bytes.
+        (H, W, 3), the ground in bytes.
     """
-    found = np.empty(ground.shape, np.uint8)
-    for y in range(held.shape[0]):
-        for x in range(held.shape[1]):
-            for c in range(3):
-                if held[y, x] == 0:
-                    off = np.float32(image[y, x, c]) - ground[y, x, c]
-                    ground[y, x, c] += min(max(off, -fall), rise) if changed[y, x] else rate * off
-                found[y, x, c] = np.uint8(ground[y, x, c] + np.float32(0.5))
+    # A value for each channel: all are alike then, and many are done at a time.
+    each = (cv2.merge((mask, mask, mask)).ravel() for mask in (held, changed.view(np.uint8)))
+    found: Image = _lead(ground.reshape(-1), image.reshape(-1), *each, rise, fall, rate)
+    return found.reshape(ground.shape)
+
+
+@njit(cache=True)
+def _lead(ground, image, held, changed, rise, fall, rate):  # type: ignore[no-untyped-def]
+    """Do the same for each of (N,) values."""
+    found = np.empty(ground.size, np.uint8)
+    for i in range(ground.size):
+        off = np.float32(image[i]) - ground[i]
+        step = off if off < rise else rise
+        step = step if step > -fall else -fall
+        step = step if changed[i] else rate * off
+        ground[i] += step if held[i] == 0 else np.float32(0.0)
+        found[i] = np.uint8(np.int32(ground[i] + np.float32(0.5)))
     return found
 
 
