@@ -84,7 +84,9 @@ class Flow:
         weights[weights < 0.05] = 0.0
         mean = weights @ self._directions / np.maximum(weights.sum(1), 1e-9)[:, None]
         length = np.hypot(*mean.T)
-        others = np.array([len(np.unique(self._ids[row > 0])) for row in weights], np.int64)
+        # (N, T) which tracks speak for each place at all.
+        whose = self._ids[:, None] == np.unique(self._ids)[None]
+        others = np.count_nonzero((weights > 0.0).astype(np.float32) @ whose.astype(np.float32), axis=1)
         cosine = (mean * directions).sum(1) / np.maximum(length, 1e-9)
         told = (others >= LEAST_OTHERS) & (length > AGREED)
         return np.where(told, np.where(cosine < AGAINST, 1, -1), 0)

@@ -243,6 +243,7 @@ class Measurer:
         for _ in range(ROUNDS):
             usual = self.sizes.sizes(0.5 * (whole[:, 1] + whole[:, 3]))
             whole = complete(visible, touches & known[:, None], usual)
+        small = (blobs.areas < TOO_SMALL * usual.prod(1)) & known & ~at_border
         numbers = np.zeros(len(blobs) + 1, np.int32)
         joined = np.zeros(len(expected.centres), np.bool_)
         alone: list[int] = []
@@ -252,8 +253,7 @@ class Measurer:
             b = int(regions[0])
             if expected.moved[tracks].any():
                 moved.extend(regions[~at_border[regions]].tolist())
-            small = blobs.areas[b] < TOO_SMALL * usual[b].prod()
-            if len(tracks) == 0 and known[b] and small and not at_border[b]:
+            if len(tracks) == 0 and small[b]:
                 continue
             if len(tracks) < 2 and len(regions) == 1:
                 size = expected.sizes[tracks[0]] if len(tracks) else usual[b]
