@@ -90,8 +90,8 @@ def _questions(roots, cues, limits, rights):  # type: ignore[no-untyped-def]
             if cues[node] < 0:
                 values[k, _hash(np.uint32(1) << np.uint32(leaves))] = limits[node]
                 leaves += 1
-    for n, node in enumerate(inner):
-        struck = (np.int64(1) << before[rights[node]]) - (np.int64(1) << before[node])
+    for n in range(inner.size):
+        struck = (np.int64(1) << before[rights[inner[n]]]) - (np.int64(1) << before[inner[n]])
         kept[n] = np.uint32(~struck & 0xFFFFFFFF)
     begins = np.append(np.searchsorted(inner, roots), inner.size)
     return begins, cues[inner].astype(np.int64), limits[inner], kept, values

@@ -5,8 +5,7 @@ p(v|b), sorted by p(v), of equals the latest first. Every frame all entries fade
 seen grows by the rate. Fading all of them would touch the whole memory in each frame, so a common factor is
 kept aside instead: an entry holds its value divided by that factor, grows by rate / factor, and all others
 stay as they are. Values are the same up to rounding, and so is the order. Most pixels need their first entry
-alone, so that those of all pixels lie side by side; the others lie pixel by pixel, as they are asked one after
-another.
+alone, so those of all pixels lie side by side; the others lie pixel by pixel, as they are asked.
 
 Features are packed into 32 bits: three bytes of colour; two signed bytes of gradient; six times five bits of
 colour before and now.
