@@ -134,18 +134,24 @@ class SizeModel:
         self._fresh += len(samples.rows)
         if len(told.rows) >= ENOUGH and self._fresh >= len(told.rows) // 8:
             self._fresh = 0
-            self._lines = robust_lines(told.rows / self._scale, told.sizes, self._scale)
+            self._lines = robust_lines(
+                told.rows / self._scale, told.sizes, self._scale, one_horizon=self.settled
+            )
             beyond = BEYOND * self._scale * np.array([-1.0, 1.0])
             self._limits = np.quantile(told.rows, [0.02, 0.98]) + beyond
 
 
-def robust_lines(places: Floats, sizes: Floats, height: float, rounds: int = 5) -> Floats:
+def robust_lines(
+    places: Floats, sizes: Floats, height: float, *, one_horizon: bool = False, rounds: int = 5
+) -> Floats:
     """Return (2, 2) offset and slope of the widths and heights that most samples agree on.
 
     Args:
         places: (K,) rows, as shares of the picture's height.
         sizes: (K, 2) width and height, px.
         height: Of the picture, px.
+        one_horizon: Whether widths vanish where heights do. Regions hold several abreast, more often so at
+            the far end than nearby; seldom do they hold several one above another.
         rounds: Of reweighting.
     """
     voted = _voted(places, sizes, height)
@@ -155,8 +161,12 @@ def robust_lines(places: Floats, sizes: Floats, height: float, rounds: int = 5) 
     lines = start
     for _ in range(rounds):
         deviation = ((sizes / np.maximum(design @ lines, SMALLEST) - 1.0) ** 2).sum(1)
-        weighted = design * np.exp(-0.5 * deviation / TOLERANCE**2)[:, None]
+        say = np.exp(-0.5 * deviation / TOLERANCE**2)
+        weighted = design * say[:, None]
         lines = start + np.linalg.solve(design.T @ weighted + _HELD, weighted.T @ (sizes - design @ start))
+        if one_horizon:
+            tall = design @ lines[:, 1]
+            lines[:, 0] = lines[:, 1] * (say * tall @ sizes[:, 0]) / (say * tall @ tall)
     return np.stack([lines[0] - lines[1] * middle, lines[1]])
 
 

@@ -39,6 +39,20 @@ def test_sizes_are_those_of_the_single_ones(seed):
         assert np.abs((lines[0] + lines[1] * place) / wanted - 1.0).max() < 0.12
 
 
+def test_heights_tell_how_wide_riders_are_where_they_ride_abreast():
+    """Far away most regions are of two who touch, nearby none is."""
+    rng = np.random.default_rng(1)
+    places = rng.uniform(0.0, 0.9, 400)
+    truth = np.array([[6.0, 12.0], [30.0, 60.0]])
+    sizes = (truth[0] + truth[1] * places[:, None]) * rng.normal(1.0, 0.06, (400, 2))
+    sizes[(places < 0.4) & (rng.random(400) < 0.9), 0] *= 1.4
+    freely, tied = (
+        robust_lines(places, sizes, 240.0, one_horizon=tie)[0] / truth[0] for tie in (False, True)
+    )
+    assert freely[0] > 1.3
+    assert np.abs(tied - 1.0).max() < 0.1
+
+
 def test_where_cars_go_sizes_are_theirs_and_not_those_of_the_one_cyclist():
     rng = np.random.default_rng(5)
     places = rng.uniform(0.1, 0.9, 480)
