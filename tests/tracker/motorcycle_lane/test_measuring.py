@@ -51,6 +51,9 @@ def test_heights_tell_how_wide_riders_are_where_they_ride_abreast():
     )
     assert freely[0] > 1.3
     assert np.abs(tied - 1.0).max() < 0.1
+    model = SizeModel(240)
+    model.learn(Samples(240.0 * places, sizes), travelled=True)
+    assert np.abs(model.sizes(np.zeros(1))[0] / truth[0] - 1.0).max() < 0.1
 
 
 def test_where_cars_go_sizes_are_theirs_and_not_those_of_the_one_cyclist():
