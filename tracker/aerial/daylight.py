@@ -42,7 +42,7 @@ class Daylight:
             (D,), grey levels.
         """
         cells = ground.reshape(*PATCH, 3)
-        self._grounds.append(np.median(cells, axis=(0, 1)))
+        self._grounds.append(_median(cells.reshape(-1, 3)))
         usual = np.maximum(self._usual(), 1.0)
         share = cv2.blur(cells, (3, 3), borderType=cv2.BORDER_REPLICATE) / usual
         dark = share.mean(2, keepdims=True) < SHADE
@@ -51,4 +51,10 @@ class Daylight:
 
     def _usual(self) -> Floats:
         """Return (3,) the usual colour of the ground below vehicles."""
-        return np.asarray(np.median(np.array(self._grounds), axis=0))
+        return _median(np.array(self._grounds))
+
+
+def _median(colours: Floats) -> Floats:
+    """Return the median (3,) of colours (N, 3), by channel: NumPy's own takes several times as long."""
+    ordered = np.sort(colours, axis=0)
+    return np.asarray(0.5 * (ordered[(len(colours) - 1) // 2] + ordered[len(colours) // 2]))

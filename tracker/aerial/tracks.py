@@ -212,11 +212,18 @@ def take_free(tracks: list[Track], outlines: Outlines) -> tuple[NDArray[np.int64
 
 def doubles(tracks: list[Track], usual: Floats) -> list[Track]:
     """Return who lies so near to a senior track that both would be in one vehicle of the usual size (2,)."""
-    seniors: list[Track] = []
-    found: list[Track] = []
-    for track in sorted(tracks, key=lambda t: (-t.confirmed, -t.hits)):
-        across = track.heading[::-1] * np.array([-1.0, 1.0])
-        apart = np.array([other.centre for other in seniors]).reshape(-1, 2) - track.centre
-        near = np.abs(apart @ np.column_stack([track.heading, across])) < WITHIN * usual
-        (found if near.all(1).any() else seniors).append(track)
-    return found
+    if not tracks:
+        return []
+    order = sorted(tracks, key=lambda t: (-t.confirmed, -t.hits))
+    centres, along = (np.array([getattr(t, name) for t in order]) for name in ("centre", "heading"))
+    across = along[:, ::-1] * np.array([-1.0, 1.0])
+    # Of (i, j): how far the centre of j lies from that of i, on the axes of i.
+    apart = centres[None] - centres[:, None]
+    near = (
+        np.abs(np.stack([(apart * axis[:, None]).sum(-1) for axis in (along, across)], -1)) < WITHIN * usual
+    )
+    within = near.all(-1)
+    senior = np.zeros(len(order), np.bool_)
+    for i in range(len(order)):
+        senior[i] = not within[i, senior].any()
+    return [track for track, first in zip(order, senior.tolist(), strict=True) if not first]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tracker.aerial.appearance import PATCH
-from tracker.aerial.daylight import Daylight
+from tracker.aerial.daylight import Daylight, _median
 
 ROAD, SHADE = np.array([110.0, 112.0, 115.0]), np.array([0.45, 0.5, 0.58])
 
@@ -48,3 +49,9 @@ def test_pale_lines_change_nothing():
 def test_black_ground_makes_no_picture_brighter_than_white():
     found = daylight().restore(patch(200.0).reshape(-1), patch(0.0).reshape(-1))
     assert (found == 255.0).all()
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 72, 200])
+def test_the_median_is_numpys(count):
+    colours = np.random.default_rng(count).uniform(0, 255, (count, 3))
+    assert np.array_equal(_median(colours), np.median(colours, axis=0))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tracker.aerial import tracks
 from tracker.aerial.appearance import PATCH
@@ -95,6 +97,29 @@ def test_two_tracks_in_one_vehicle_are_one_too_many():
     assert tracks.doubles([double, first, abreast, behind], SIZE) == [double]
     # As long as no size is the usual one nothing is known.
     assert tracks.doubles([double, first], np.zeros(2)) == []
+
+
+@settings(max_examples=60, deadline=None)
+@given(count=st.integers(0, 12), seed=st.integers(0, 1000))
+def test_doubles_are_those_that_a_plain_loop_finds(count, seed):
+    rng = np.random.default_rng(seed)
+    everyone = []
+    for number in range(count):
+        track = tracks.begin(number, outlines(rng.uniform(0, 60, 2)), 0, 0)
+        angle = rng.uniform(-np.pi, np.pi)
+        track.heading = np.array([np.cos(angle), np.sin(angle)])
+        track.confirmed, track.hits = bool(rng.integers(2)), int(rng.integers(1, 5))
+        everyone.append(track)
+    seniors, found = [], []
+    for track in sorted(everyone, key=lambda t: (-t.confirmed, -t.hits)):
+        across = np.array([-track.heading[1], track.heading[0]])
+        apart = [senior.centre - track.centre for senior in seniors]
+        inside = [
+            abs(a @ track.heading) < tracks.WITHIN * SIZE[0] and abs(a @ across) < tracks.WITHIN * SIZE[1]
+            for a in apart
+        ]
+        (found if any(inside) else seniors).append(track)
+    assert tracks.doubles(everyone, SIZE) == found
 
 
 def test_a_confirmed_track_does_not_jump():
