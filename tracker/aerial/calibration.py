@@ -6,7 +6,6 @@ Along the way and across it that is learnt apart: most keep to their lanes, what
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 
@@ -102,17 +101,16 @@ class Calibration:
             self._running.append(Rehearsal(track, tick, self._forecaster(trajectories, track)))
 
     def covariance(
-        self, forecast: Forecast, lead: int, bounds: Sequence[ArrayLike] = (LEAST, MOST)
+        self, forecast: Forecast, lead: int, bounds: tuple[float, float] = (LEAST, MOST)
     ) -> Floats:
         """Return (2, 2) of a forecast ``lead`` frames ahead, calibrated, px^2.
 
         Args:
             forecast: Advanced to there.
             lead: Frames.
-            bounds: Least and greatest factors of the variances; of those along the way and across it, (2, 2).
+            bounds: Least and greatest factors of the variances.
         """
-        least, most = bounds
-        along, across = np.sqrt(np.minimum(np.maximum(self._scales[min(lead, LEADS[-1])], least), most))
+        along, across = np.sqrt(np.clip(self._scales[min(lead, LEADS[-1])], *bounds))
         heading = unit(forecast.velocity)
         stretch = across * IDENTITY + (along - across) * heading * heading[:, None]
         return np.asarray(stretch @ forecast.covariance @ stretch)
