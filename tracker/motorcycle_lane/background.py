@@ -148,11 +148,7 @@ class BackgroundModel:
         self.parameters = p = BackgroundParameters() if parameters is None else parameters
         self._shape = height, width
         pixels = height * width
-        self._tables = (
-            Table.empty(p.colours[1], pixels),
-            Table.empty(p.gradients[1], pixels),
-            Table.empty(p.pairs[1], pixels),
-        )
+        self._tables = tuple(Table.empty(most, pixels) for _, most in (p.colours, p.gradients, p.pairs))
         self._background = np.zeros((3, pixels), np.float32)
         self._picture: NDArray[np.uint8] | None = None  # the same in bytes, once it is asked for
         self._previous = np.zeros(pixels, np.uint32)
@@ -186,10 +182,7 @@ class BackgroundModel:
         i = row * self._shape[1] + column
         shared = self._factor_shared[i] if self._conditional else self._factor
         factors = np.array([self._factor, shared], np.float64)
-        both = (
-            np.stack([np.append(usual[i], rest[i]) for usual, rest in zip(*table, strict=True)][1:], 1)
-            for table in self._tables
-        )
+        both = (table.values(i) for table in self._tables)
         return tuple(factors * values[values[:, 0] > 0] for values in both)
 
     def apply(self, image: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -344,9 +337,7 @@ class BackgroundModel:
         """Take a frame for background, the only thing that each pixel has ever shown."""
         features = extract(image)
         for table, feature in zip(self._tables, features, strict=True):
-            table.rest.seen[:] = 0.0
-            table.usual.features[:] = feature
-            table.usual.seen[:] = table.usual.shared[:] = 1.0
+            table.begin(feature)
         self._background[:], self._picture = image.reshape(-1, 3).T, None
         self._previous = features[0]
         self._p_b[:] = 1.0

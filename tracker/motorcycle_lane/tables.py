@@ -63,6 +63,18 @@ class Table(NamedTuple):
         """Return a table without entries."""
         return cls(Entries.empty(pixels), Entries.empty(pixels, entries - 1))
 
+    def begin(self, features: NDArray[np.uint32]) -> None:
+        """Take features (P,) of the background for all that the pixels have ever shown."""
+        self.usual.features[:] = features
+        self.usual.seen[:] = self.usual.shared[:] = 1.0
+        self.rest.seen[:] = 0.0
+
+    def values(self, pixel: int) -> NDArray[np.float32]:
+        """Return (M, 2) p(v) and p(v|b) of a pixel's entries, without their common factors."""
+        usual, rest = self
+        pairs = ((usual.seen, rest.seen), (usual.shared, rest.shared))
+        return np.stack([np.append(first[pixel], others[pixel]) for first, others in pairs], 1)
+
 
 @njit(cache=True)
 def _near(a, b, tolerance):  # type: ignore[no-untyped-def]
