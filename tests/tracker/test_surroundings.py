@@ -35,3 +35,11 @@ def test_candidates_have_enough_foreground_around(raw, dense):
     for y, x in np.ndindex(*SHAPE):
         count = wide[y : y + surroundings.NEAR, x : x + surroundings.NEAR].sum()
         assert surroundings.candidates(raw, dense)[y, x] == (count >= round(dense * surroundings.NEAR**2))
+
+
+@settings(deadline=None)
+@given(arrays(np.int32, SHAPE, elements=st.integers(-1, 5)), arrays(np.bool_, 6))
+def test_pixels_are_those_of_chosen_squares_and_of_no_others(numbers, chosen):
+    squares = surroundings.Blocks(np.zeros(6, np.int64), np.zeros(6, np.int64), numbers)
+    wanted = [[number >= 0 and chosen[number] for number in row] for row in numbers.tolist()]
+    assert np.array_equal(squares.pixels(chosen), wanted)

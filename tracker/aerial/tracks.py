@@ -215,14 +215,13 @@ def doubles(tracks: list[Track], usual: Floats) -> list[Track]:
     if not tracks:
         return []
     order = sorted(tracks, key=lambda t: (-t.confirmed, -t.hits))
-    centres, along = (np.array([getattr(t, name) for t in order]) for name in ("centre", "heading"))
+    centres = np.array([track.centre for track in order])
+    along = np.array([track.heading for track in order])
     across = along[:, ::-1] * np.array([-1.0, 1.0])
     # Of (i, j): how far the centre of j lies from that of i, on the axes of i.
     apart = centres[None] - centres[:, None]
-    near = (
-        np.abs(np.stack([(apart * axis[:, None]).sum(-1) for axis in (along, across)], -1)) < WITHIN * usual
-    )
-    within = near.all(-1)
+    away = np.abs(np.stack([(apart * axis[:, None]).sum(-1) for axis in (along, across)], -1))
+    within = (away < WITHIN * usual).all(-1)
     senior = np.zeros(len(order), np.bool_)
     for i in range(len(order)):
         senior[i] = not within[i, senior].any()
