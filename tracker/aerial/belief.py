@@ -26,6 +26,16 @@ DETECTION = 0.5
 FLOOR = 1e-3
 """Share of an offset's first weight that is left to it: what is known of bridges and trees may be wrong."""
 STEP = float(OFFSETS[1] - OFFSETS[0])
+LASTING = 1.25
+"""How much faster a vehicle ahead of its forecast goes in the end, in how much faster it was on the whole: 1
+if it always was, 1.5 if its acceleration is white noise."""
+LEFT = 0.75
+"""Variance of that speed once the place is known, in variances of the place over the time squared, if the
+acceleration is white noise."""
+SPEED = 0.35
+"""Standard deviation of a new track's measured speed, and of what drivers do just then, px a frame."""
+STRANGE = 0.2
+"""Strangers' speeds, a px a frame: they go as fast as traffic may."""
 
 
 class Belief:
@@ -69,6 +79,24 @@ class Belief:
         near = np.exp(-0.5 * ((ahead[:, None] - along * OFFSETS) / width) ** 2) @ (self.weights / self.unseen)
         lane = -0.5 * (FREEDOM + 1.0) * np.log1p((beside / across) ** 2 / FREEDOM)
         return np.asarray(np.log(near + 1e-12) + lane - np.log(LANE * across * np.sqrt(2.0 * np.pi) * width))
+
+
+def speed_log_ratio(faster: Floats, ahead: Floats, along: float, lead: float) -> Floats:
+    """Weigh the speeds of new tracks: who is ahead of its forecast went faster, and goes faster now.
+
+    Args:
+        faster: (M,) px a frame by which they are faster than forecast.
+        ahead: (M,) px by which they are ahead of the forecast.
+        along: Standard deviation of the forecast along the way, px.
+        lead: Frames since the hidden vehicle was seen.
+
+    Returns:
+        (M,) the log density if it is the hidden vehicle, less that of a stranger.
+    """
+    variance = LEFT * (along / lead) ** 2 + SPEED**2
+    squared = (faster - LASTING * ahead / lead) ** 2 / variance
+    tail = -0.5 * (FREEDOM + 1.0) * np.log1p(squared / FREEDOM)
+    return np.asarray(tail - np.log(LANE * np.sqrt(variance)) - np.log(STRANGE))
 
 
 def deviations(heading: Floats, covariance: Floats) -> tuple[float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.aerial.appearance import PATCH
-from tracker.aerial.belief import OFFSETS, Belief, deviations
+from tracker.aerial.belief import OFFSETS, Belief, deviations, speed_log_ratio
 from tracker.aerial.calibration import Calibration
 from tracker.aerial.forecasts import Forecaster
 from tracker.aerial.occluders import Occluders
@@ -58,6 +58,7 @@ class HiddenVehicles:
         self._longest = round(LONGEST * rate)
         self._unlikely: dict[int, int] = {}
         self._beliefs: dict[int, Belief] = {}
+        self._tick = -1
         self._covariances: dict[int, Floats] = {}
 
     def rehearse(self, trajectories: Trajectories, tick: int, seen: list[int]) -> None:
@@ -82,6 +83,7 @@ class HiddenVehicles:
             to_mosaic: (3, 3).
             begun: Tracks of which it is not yet decided who they are.
         """
+        self._tick = tick
         left = []
         for track in self.tracks:
             assert track.forecast is not None
@@ -132,13 +134,15 @@ class HiddenVehicles:
             centres=np.array([track.centre for track in self.tracks]),
             covariances=np.array([self.covariance(track) for track in self.tracks]) + np.eye(2),
             pictures=[np.array(track.pictures) if track.pictures else none for track in self.tracks],
-            densities=np.array([self._density(track, centres) for track in self.tracks]),
+            headings=np.array([track.pictured for track in self.tracks]),
+            densities=np.array([self._density(track, new) for track in self.tracks]),
         )
         shown = transform(inverse(to_mosaic), centres)
         border = np.minimum(shown, self._size - shown).min(1)
         appeared = Appeared(
             centres=centres,
             pictures=np.array([np.mean(track.pictures, 0) for track in new]),
+            headings=np.array([track.pictured for track in new]),
             strangers=np.where(border < ENTRY, ENTERING, INSIDE),
         )
         rows, columns = self._matcher(hidden, appeared)
@@ -149,9 +153,21 @@ class HiddenVehicles:
             self._forget(number)
         return pairs
 
-    def _density(self, track: Track, points: Floats) -> Floats:
-        """Return (M,) log densities, a px^2, at points (M, 2), of a hidden vehicle that may be lost."""
+    def _density(self, track: Track, new: list[Track]) -> Floats:
+        """Return (M,) log densities, a px^2, of a hidden vehicle that may be lost, where new ones are.
+
+        How fast they go tells, too, by what it is likelier than of a stranger.
+        """
         belief = self._beliefs[track.id]
         covariance = self.covariance(track) + np.eye(2)
         still = np.log(belief.unseen / (belief.unseen + LOST))
-        return np.asarray(still + belief.log_density(points, track.centre, track.heading, covariance))
+        points = np.array([other.centre for other in new])
+        ahead = (points - track.centre) @ track.heading
+        paces = [other.pace * np.sign(other.heading @ track.heading) for other in new]
+        along, _ = deviations(track.heading, covariance)
+        speeds = speed_log_ratio(
+            np.array(paces) - np.hypot(*track.velocity), ahead, along, self._tick - track.since
+        )
+        return np.asarray(
+            still + speeds + belief.log_density(points, track.centre, track.heading, covariance)
+        )

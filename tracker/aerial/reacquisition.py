@@ -18,6 +18,11 @@ from tracker.filtering.assignment import Indices, assign
 Floats = NDArray[np.float64]
 
 
+STRAIGHT, BENT = 0.95, 0.5
+"""Cosine of the angle between two sights' headings below which the sun has come to stand elsewhere, and by
+how much less looks count there."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hidden:
     """N hidden vehicles.
@@ -26,12 +31,14 @@ class Hidden:
         centres: (N, 2) where they are expected, px.
         covariances: (N, 2, 2) px^2.
         pictures: N arrays (L, D) of what they looked like.
+        headings: (N, 2) unit vectors, of the last pictures.
         densities: (N, M) log of each one's density, a px^2, where the new vehicles are.
     """
 
     centres: Floats
     covariances: Floats
     pictures: list[Floats]
+    headings: Floats
     densities: Floats
 
 
@@ -42,11 +49,13 @@ class Appeared:
     Attributes:
         centres: (M, 2) px.
         pictures: (M, D).
+        headings: (M, 2) unit vectors, of the last pictures.
         strangers: (M,) vehicles a px^2 that appear there and were never seen before.
     """
 
     centres: Floats
     pictures: Floats
+    headings: Floats
     strangers: Floats
 
 
@@ -85,7 +94,8 @@ class Fusion:
         if self.looks:
             near = np.flatnonzero((squared <= self.gate).any(1))
             looks = appearance.log_ratios(new.pictures, [hidden.pictures[i] for i in near], self.looks)
-            ratios[near] += np.clip(self.looks * looks, -self.most, self.most)
+            straight = hidden.headings[near] @ new.headings.T > STRAIGHT
+            ratios[near] += np.where(straight, 1.0, BENT) * np.clip(self.looks * looks, -self.most, self.most)
         return best(np.where(squared <= self.gate, ratios, -np.inf), self.least)
 
 

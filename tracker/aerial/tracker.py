@@ -194,6 +194,7 @@ class AerialTracker:
                 picture = appearance.cut(image, middle, *(turn @ side for side in sides))
                 ground = appearance.cut(self._background.ground, track.centre - corner, *sides)
                 track.pictures.append(self._daylight.restore(picture, ground))
+                track.pictured = track.heading.copy()
         if whole:
             self._hidden.occluders.see(
                 np.array([track.centre for track in whole]), np.array([track.heading for track in whole])

@@ -37,6 +37,8 @@ SETTLED = 25
 """Frames after which the size and heading of a confirmed track are known."""
 MOST_MISSES = 2
 """Successive misses after which a confirmed track is hidden, and any other one ends."""
+YOUNG = 30
+"""Outlines of a new track that tell how fast it goes."""
 SLOWEST = 0.25
 """Px a frame below which a heading is kept as it was."""
 GROW, SHRINK, NEW = 0.15, 0.1, 0.3
@@ -63,7 +65,9 @@ class Track:
         misses: Successive frames not measured.
         confirmed: Whether it is a vehicle for sure.
         whole: Whether it was in full view when last measured.
+        outlines: Ticks, centres (2,) and lengths of its outlines until it is confirmed.
         pictures: What it looked like, (D,) each.
+        pictured: (2,) heading at the last picture.
         forecast: Of a track that is not seen.
         since: Last tick at which it was seen, or, of a track that is not seen, of its path.
         hidden: What was known of it while it was not seen, if it was: who is lost again too soon may not have
@@ -77,10 +81,12 @@ class Track:
     heading: Floats
     size: Floats
     origin: Floats
+    pictured: Floats
     hits: int = 1
     misses: int = 0
     confirmed: bool = False
     whole: bool = False
+    outlines: deque[tuple[int, Floats, float]] = field(default_factory=lambda: deque(maxlen=YOUNG))
     pictures: deque[Floats] = field(default_factory=lambda: deque(maxlen=appearance.MEMORY))
     forecast: Forecast | None = None
     since: int = 0
@@ -101,6 +107,19 @@ class Track:
         """(2, 2) of the centre, px^2."""
         return np.diag(self.spread[:, 0, 0])
 
+    @property
+    def pace(self) -> float:
+        """How fast a new track's front goes, px a frame: while it comes out its middle goes at half of that.
+
+        0 as long as there is one outline.
+        """
+        if len(self.outlines) < 2:
+            return 0.0
+        ticks = np.array([tick for tick, _, _ in self.outlines], float)
+        fronts = np.array([centre @ self.heading + 0.5 * length for _, centre, length in self.outlines])
+        since = ticks - ticks.mean()
+        return float(since @ fronts / (since @ since))
+
     def went(self, lengths: float = 2.0) -> bool:
         """Tell whether it is so many of its lengths away from where it began."""
         return float(np.hypot(*(self.centre - self.origin))) > lengths * float(self.size[0])
@@ -117,7 +136,9 @@ def begin(number: int, outlines: Outlines, k: int, tick: int) -> Track:
         heading=outlines.headings[k],
         size=np.maximum(outlines.sizes[k], 4.0),
         origin=centre.copy(),
+        pictured=outlines.headings[k],
         since=tick,
+        outlines=deque([(tick, centre, float(outlines.sizes[k, 0]))], YOUNG),
     )
 
 
@@ -173,6 +194,8 @@ def measure(
         squared = float(((centre - track.state[:, 0]) ** 2 / (track.spread[:, 0, 0] + NOISE**2)).sum())
         if squared > GATE:
             return False
+    if not track.confirmed:
+        track.outlines.append((tick, centre, float(size[0])))
     kalman.update(track.state, track.spread, np.arange(2), centre, NOISE**2)
     rate = np.where(size > track.size, GROW, SHRINK) if settled else np.full(2, NEW)
     track.size = np.maximum(track.size + rate * (size - track.size), 4.0)

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracker.aerial.belief import FLOOR, OFFSETS, PRIOR, Belief, deviations
+from tracker.aerial.belief import (
+    FLOOR,
+    LASTING,
+    LEFT,
+    OFFSETS,
+    PRIOR,
+    STRANGE,
+    Belief,
+    deviations,
+    speed_log_ratio,
+)
+from tracker.filtering import planar
 
 HEADING = np.array([0.6, -0.8])
 BESIDE = np.array([0.8, 0.6])
@@ -69,3 +80,23 @@ def test_the_first_in_is_the_first_out():
         for c, b in zip((first, second), beliefs, strict=True)
     )
     assert right > wrong
+
+
+def test_who_is_behind_goes_slower():
+    """Sixty frames late, 30 px behind: half a px a frame too slow on the whole, and a bit more now."""
+    speeds = np.linspace(-12.0, 12.0, 4801)
+    ratios = speed_log_ratio(speeds, np.full(4801, -30.0), 20.0, 60.0)
+    assert speeds[ratios.argmax()] == pytest.approx(-0.5 * LASTING, abs=0.005)
+    assert (np.exp(ratios) * STRANGE).sum() * 0.005 == pytest.approx(1.0, abs=0.01)
+    as_forecast, slower, much_faster = speed_log_ratio(
+        np.array([0.0, -0.6, 2.0]), np.array([-30.0, -30.0, -30.0]), 20.0, 60.0
+    )
+    assert slower > as_forecast + 0.5
+    assert slower > 0 > much_faster
+
+
+def test_what_a_speed_leaves_unknown_is_that_of_white_acceleration():
+    spread = planar.predict(np.zeros((1, 4)), np.zeros((1, 4, 4)), 60.0, 0.01)[1][0, :2, :2]
+    left = spread[1, 1] - spread[0, 1] ** 2 / spread[0, 0]
+    assert left == pytest.approx(LEFT * spread[0, 0] / 60.0**2)
+    assert 1.0 <= LASTING <= spread[0, 1] / spread[0, 0] * 60.0 == pytest.approx(1.5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -129,6 +130,7 @@ def _scene(centres, new, *, looks=None, spread=100.0):
         centres=np.array(centres, float),
         covariances=np.tile(spread * np.eye(2), (len(centres), 1, 1)),
         pictures=groups,
+        headings=np.tile([1.0, 0.0], (len(centres), 1)),
         densities=np.array(
             [
                 [-0.5 * np.subtract(at, place) @ np.subtract(at, place) / spread for at in new]
@@ -138,7 +140,10 @@ def _scene(centres, new, *, looks=None, spread=100.0):
         - np.log(2 * np.pi * spread),
     )
     return hidden, Appeared(
-        centres=np.array(new, float), pictures=pictures, strangers=np.full(len(new), 1e-5)
+        centres=np.array(new, float),
+        pictures=pictures,
+        headings=np.tile([1.0, 0.0], (len(new), 1)),
+        strangers=np.full(len(new), 1e-5),
     )
 
 
@@ -152,6 +157,15 @@ def test_place_and_looks_are_weighed_together():
     assert PrintedStages()(hidden, new)[0].tolist() == [1]
 
 
+def test_looks_count_for_less_after_a_bend():
+    hidden, new = _scene([[0, 0], [14, 0]], [[2, 0]], looks=[1])
+    # By its place it is six nats likelier to be the first; looks say eight of the second, or half of that.
+    hidden = replace(hidden, densities=np.array([[-8.0], [-14.0]]))
+    for angle, chosen in ((0.0, 1), (0.3, 1), (0.5, 0), (3.0, 0)):
+        turned = replace(new, headings=np.array([[np.cos(angle), np.sin(angle)]]))
+        assert Fusion()(hidden, turned)[0].tolist() == [chosen]
+
+
 def test_what_is_far_off_is_none_of_them():
     hidden, new = _scene([[0, 0], [14, 0]], [[200, 0]], looks=[1])
     for matcher in (Fusion(), Fusion(motion=False), Nearest(), PrintedStages()):
@@ -159,7 +173,10 @@ def test_what_is_far_off_is_none_of_them():
     # And so is one in place that looks like neither: a stranger's look outweighs it.
     hidden, new = _scene([[0, 0], [14, 0]], [[40, 0]], looks=[0])
     strange = Appeared(
-        centres=new.centres, pictures=255.0 - hidden.pictures[0][:1], strangers=np.full(1, 1e-3)
+        centres=new.centres,
+        pictures=255.0 - hidden.pictures[0][:1],
+        headings=new.headings,
+        strangers=np.full(1, 1e-3),
     )
     assert len(Fusion()(hidden, strange)[0]) == 0
 
@@ -198,8 +215,14 @@ def test_a_change_of_lanes_is_left_to_the_density():
         centres=np.zeros((1, 2)),
         covariances=np.diag([100.0, 4.0])[None],
         pictures=[pictures],
+        headings=np.array([[1.0, 0.0]]),
         densities=np.array([[-4.0]]),
     )
-    new = Appeared(centres=np.array([[0.0, 10.0]]), pictures=pictures, strangers=np.array([2e-5]))
+    new = Appeared(
+        centres=np.array([[0.0, 10.0]]),
+        pictures=pictures,
+        headings=hidden.headings,
+        strangers=np.array([2e-5]),
+    )
     assert len(Fusion()(hidden, new)[0]) == 1
     assert len(Fusion(gate=16.0)(hidden, new)[0]) == 0

@@ -72,6 +72,23 @@ def test_of_a_vehicle_that_drives_under_a_bridge_the_rear_tells_the_place():
     assert abs(track.size[0] - SIZE[0]) < 2.0
 
 
+def test_a_new_tracks_front_tells_how_fast_it_goes():
+    rng = np.random.default_rng(4)
+    track = tracks.begin(1, outlines((52.0, 100.0), size=[4.0, 12.0]), 0, 0)
+    assert track.pace == 0.0
+    for tick in (1, 2, 3, 5, 6, 7, 8):
+        tracks.predict([track])
+        length = 4.0 + 3.0 * tick + rng.normal(0, 0.2)
+        tracks.measure(
+            track, np.array([50.0 + 0.5 * length, 100.0]), np.array([length, 12.0]), tick, False, SIZE
+        )
+    assert abs(track.pace - 3.0) < 0.15
+    assert track.velocity[0] < 2.0
+    track.confirmed = True
+    tracks.measure(track, np.array([64.0, 100.0]), SIZE, 9, False)
+    assert len(track.outlines) == 8
+
+
 def test_a_track_that_began_at_a_part_grows_to_the_whole_and_no_further():
     track = driven()
     track.confirmed, track.size = True, np.array([12.0, 12.0])
@@ -176,6 +193,28 @@ def test_who_comes_back_where_it_is_expected_gets_its_id_back():
     ((old, found),) = hidden.reacquire([new], np.eye(3))
     assert (old.id, found.id) == (2, 9)
     assert [track.id for track in hidden.tracks] == [1]
+
+
+def came_out(speed: float, *, x: float, tick: int) -> Track:
+    """Return a new track that has been seen for ten frames at a speed."""
+    new = tracks.begin(9, outlines((x - 9 * speed, 100.0)), 0, tick - 9)
+    for k in range(8, -1, -1):
+        tracks.predict([new])
+        tracks.measure(new, np.array([x - k * speed, 100.0]), SIZE, tick - k, False)
+    new.pictures.append(picture(128.0))
+    return new
+
+
+def test_who_comes_out_late_is_known_by_having_braked():
+    found = {}
+    for speed in (1.0, 3.0):
+        hidden = hide(driven())
+        for tick in range(40, 70):
+            hidden.step(tick, np.eye(3), [])
+        found[speed] = hidden._density(hidden.tracks[0], [came_out(speed, x=50.0 + 3 * 69 - 33, tick=69)])
+    assert found[1.0] > found[3.0] + 1.0
+    # Who comes the other way is somebody else.
+    assert hidden._density(hidden.tracks[0], [came_out(-3.0, x=257.0, tick=69)]) < found[3.0] - 2.0
 
 
 def test_a_stranger_far_away_stays_one():
