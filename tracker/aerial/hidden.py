@@ -135,7 +135,7 @@ class HiddenVehicles:
             covariances=np.array([self.covariance(track) for track in self.tracks]) + np.eye(2),
             pictures=[np.array(track.pictures) if track.pictures else none for track in self.tracks],
             headings=np.array([track.pictured for track in self.tracks]),
-            densities=np.array([self._density(track, new) for track in self.tracks]),
+            densities=self._densities(new),
         )
         shown = transform(inverse(to_mosaic), centres)
         border = np.minimum(shown, self._size - shown).min(1)
@@ -153,21 +153,19 @@ class HiddenVehicles:
             self._forget(number)
         return pairs
 
-    def _density(self, track: Track, new: list[Track]) -> Floats:
-        """Return (M,) log densities, a px^2, of a hidden vehicle that may be lost, where new ones are.
+    def _densities(self, new: list[Track]) -> Floats:
+        """Return (N, M) log densities, a px^2, of the hidden vehicles, that may be lost, where new ones are.
 
-        How fast they go tells, too, by what it is likelier than of a stranger.
+        How fast those go tells, too, by what it is likelier than of a stranger.
         """
-        belief = self._beliefs[track.id]
-        covariance = self.covariance(track) + np.eye(2)
-        still = np.log(belief.unseen / (belief.unseen + LOST))
-        points = np.array([other.centre for other in new])
-        ahead = (points - track.centre) @ track.heading
-        paces = [other.pace * np.sign(other.heading @ track.heading) for other in new]
-        along, _ = deviations(track.heading, covariance)
-        speeds = speed_log_ratio(
-            np.array(paces) - np.hypot(*track.velocity), ahead, along, self._tick - track.since
-        )
-        return np.asarray(
-            still + speeds + belief.log_density(points, track.centre, track.heading, covariance)
-        )
+        points, headings = np.array([t.centre for t in new]), np.array([t.heading for t in new])
+        paces = np.array([t.pace for t in new])
+        found = np.empty((len(self.tracks), len(new)))
+        for row, track in zip(found, self.tracks, strict=True):
+            belief, covariance = self._beliefs[track.id], self.covariance(track) + np.eye(2)
+            faster = paces * np.sign(headings @ track.heading) - np.hypot(*track.velocity)
+            ahead, along = (points - track.centre) @ track.heading, deviations(track.heading, covariance)[0]
+            row[:] = np.log(belief.unseen / (belief.unseen + LOST))
+            row += speed_log_ratio(faster, ahead, along, self._tick - track.since)
+            row += belief.log_density(points, track.centre, track.heading, covariance)
+        return found

@@ -120,7 +120,8 @@ class AerialTracker:
         )
         rest = find_blobs(left > 0, LEAST_AREA)
         sharper = contrast(rest, self._background)
-        self._background.adopt(np.append(False, sharper < GHOST)[rest.labels])
+        if (ghosts := sharper < GHOST).any():
+            self._background.adopt(np.append(False, ghosts)[rest.labels])
         free = free_outlines(rest.labels, len(rest))
         to_picture = inverse(to_mosaic)
         cut = self._cut_off(transform(to_picture, own.corners() + origin))
