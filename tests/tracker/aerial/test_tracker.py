@@ -142,6 +142,20 @@ def test_a_vehicle_looks_in_the_shade_as_in_the_sun(frames):
 
 
 @pytest.mark.usefixtures("all_changes")
+def test_it_is_remembered_which_way_the_last_picture_was_taken(frames, all_changes):
+    tracker = AerialTracker()
+    tracker.start(INFO)
+    for k, image in enumerate(frames[:60]):
+        if k == 50:
+            for track in tracker._tracks:
+                track.pictured = np.zeros(2)
+        tracker.step(Frame(image=image, tick=k, time=k / 30.0))
+    known = [track for track in tracker._tracks if track.confirmed]
+    assert len(known) >= 2
+    for track in known:
+        assert track.pictured @ [1.0, 0.0] > 0.99
+
+
 def test_rehearsals_narrow_what_is_hidden_no_further_than_they_may(frames):
     tracker, found = AerialTracker(), []
     tracker.start(INFO)
