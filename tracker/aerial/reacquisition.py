@@ -17,7 +17,6 @@ from tracker.filtering.assignment import Indices, assign
 
 Floats = NDArray[np.float64]
 
-
 STRAIGHT, BENT = 0.95, 0.5
 """Cosine of the angle between two sights' headings below which the sun has come to stand elsewhere, and by
 how much less looks count there."""
@@ -32,7 +31,8 @@ class Hidden:
         covariances: (N, 2, 2) px^2.
         pictures: N arrays (L, D) of what they looked like.
         headings: (N, 2) unit vectors, of the last pictures.
-        densities: (N, M) log of each one's density, a px^2, where the new vehicles are.
+        densities: (N, M) log of each one's density, a px^2, where the new vehicles are, with what their speeds
+            speak for it.
     """
 
     centres: Floats
