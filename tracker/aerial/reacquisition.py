@@ -31,8 +31,8 @@ class Hidden:
         covariances: (N, 2, 2) px^2.
         pictures: N arrays (L, D) of what they looked like.
         headings: (N, 2) unit vectors, of the last pictures.
-        densities: (N, M) log of each one's density, a px^2, where the new vehicles are, with what their speeds
-            speak for it.
+        densities: (N, M) log of each one's density, a px^2, where the new vehicles are, and what their
+            speeds speak for it.
     """
 
     centres: Floats
