@@ -142,7 +142,7 @@ def test_a_vehicle_looks_in_the_shade_as_in_the_sun(frames):
 
 
 @pytest.mark.usefixtures("all_changes")
-def test_it_is_remembered_which_way_the_last_picture_was_taken(frames, all_changes):
+def test_it_is_remembered_which_way_the_last_picture_was_taken(frames):
     tracker = AerialTracker()
     tracker.start(INFO)
     for k, image in enumerate(frames[:60]):
@@ -156,6 +156,7 @@ def test_it_is_remembered_which_way_the_last_picture_was_taken(frames, all_chang
         assert track.pictured @ [1.0, 0.0] > 0.99
 
 
+@pytest.mark.usefixtures("all_changes")
 def test_rehearsals_narrow_what_is_hidden_no_further_than_they_may(frames):
     tracker, found = AerialTracker(), []
     tracker.start(INFO)
